@@ -31,7 +31,7 @@ import time
 
 from common import emit, log
 from cpg_ros.dynamics.arclength import NoOrbit
-from cpg_ros.dynamics.floquet import ATTRACTS, multipliers_within
+from cpg_ros.dynamics.floquet import MAX_STABLE_MODULUS, multipliers_within
 from cpg_ros.dynamics.integration.simulate import simulate, Trajectory
 from cpg_ros.dynamics.orbit import check_values, signal_symmetry
 from cpg_ros.dynamics.settling import last_cycle
@@ -218,7 +218,7 @@ def judged(network: Network, gait: str, periods: list[float], everything: bool =
     growth = [multipliers_within(one).leading for one in orbits]
     attracting = [one.period for one, largest in zip(orbits, growth, strict=True)
                   if largest < 1.0 + NEUTRAL]
-    neutral = any(ATTRACTS <= largest < 1.0 + NEUTRAL for largest in growth)
+    neutral = any(MAX_STABLE_MODULUS <= largest < 1.0 + NEUTRAL for largest in growth)
     lost = [period for period in periods
             if not any(abs(one / period - 1.0) < 1e-2 for one in attracting)]
     if not lost:

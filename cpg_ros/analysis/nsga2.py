@@ -40,7 +40,7 @@ from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.integration.simulate import simulate, Trajectory
 from cpg_ros.dynamics.orbit import Orbit
-from cpg_ros.dynamics.settling import ALIVE, COARSE_STEPS, KEPT_FRACTION, last_cycle
+from cpg_ros.dynamics.settling import last_cycle, MIN_RANGE, SAMPLE_PERIOD, STEP_RATIO
 from cpg_ros.dynamics.solve_orbit import solve_preset
 from cpg_ros.fitting.gaits.recognition import shape_difference
 from cpg_ros.networks.network import Network, Preset
@@ -104,8 +104,8 @@ def survives(orbit: Orbit, seed: int = 0) -> bool:
     """Return whether a gait survives noise without a lock, started from its orbit."""
     network, symmetry = orbit.network, orbit.symmetry
     starts = np.repeat(orbit(np.zeros(1)), RUNS, axis=0)
-    step = COARSE_STEPS * network.step
-    every = max(1, round(KEPT_FRACTION / step))
+    step = STEP_RATIO * network.step
+    every = max(1, round(SAMPLE_PERIOD / step))
     noisy = simulate(network, starts, DURATION, step, noise=NOISE, seed=seed, every=every,
                      progress=False, quiet=True)
     window = round(CYCLES * orbit.period / (step * every))
@@ -126,7 +126,7 @@ def survives(orbit: Orbit, seed: int = 0) -> bool:
 
 def _holds(signals: np.ndarray, symmetry: Symmetry) -> bool:
     """Return whether the cells are alive and in phase on the mean of a few noisy cycles."""
-    alive = np.ptp(signals[:, :symmetry.group.cells], axis=0).min() >= ALIVE
+    alive = np.ptp(signals[:, :symmetry.group.cells], axis=0).min() >= MIN_RANGE
     return bool(alive and phase_errors(_folded(signals), symmetry).max() <= LOST)
 
 

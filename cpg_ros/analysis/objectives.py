@@ -293,7 +293,8 @@ def _simulated(network: Network, gait: str, run: Trajectory
     finite = bool(np.isfinite(run.x[-1]).all())
     cycle = settling.last_cycle(run, cells) if finite else None
     if cycle is None:
-        alive = finite and np.ptp(run.x[run.t.size // 2:, :cells], axis=0).max() >= settling.ALIVE
+        span = np.ptp(run.x[run.t.size // 2:, :cells], axis=0)
+        alive = finite and span.max() >= settling.MIN_RANGE
         return Score(network, np.full(len(pairs(symmetry)), WORST),
                      APERIODIC if alive else DEAD, 0.0 if two else None, 10.0), None
     signals = cycle.signals
@@ -311,7 +312,7 @@ def _simulated(network: Network, gait: str, run: Trajectory
     # Estimate the multiplier by the decay of the start's disturbance per cycle. It is above 1 if
     # the network has left the gait.
     stability = min(APERIODIC, (max(mismatch, 1e-10) / START_MISMATCH)
-                    **(cycle.period / settling.SPAN))
+                    **(cycle.period / settling.DURATION))
     score = Score(network, errors, float(stability), difference, float(shortfall))
     return score, cycle if near and shortfall == 0.0 else None
 

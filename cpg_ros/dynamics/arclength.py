@@ -36,9 +36,9 @@ Point = TypeVar('Point')
 # Zeros of functions of one variable.
 
 #: Absolute and relative tolerance of a zero.
-EXACT = 1e-13
-#: An extremum on the grid may lie this many times further on than it differs from its neighbours.
-REACH = 4.0
+ROOT_TOLERANCE = 1e-13
+#: Distance of an extremum from zero over its difference from its neighbours on the grid.
+MAX_EXTREMUM_RATIO = 4.0
 
 
 def locate(event: Callable[[Point], float], point_at: Callable[[float], Point], low: float,
@@ -58,7 +58,7 @@ def locate(event: Callable[[Point], float], point_at: Callable[[float], Point], 
     """
     solved = cache(point_at)
     return solved(float(scipy.optimize.brentq(lambda s: event(solved(s)), low, high,
-                                              xtol=tolerance, rtol=EXACT)))
+                                              xtol=tolerance, rtol=ROOT_TOLERANCE)))
 
 
 def crossings(function: Callable[[float], float], grid: np.ndarray,
@@ -77,7 +77,7 @@ def crossings(function: Callable[[float], float], grid: np.ndarray,
     points, ordinates = list(grid), list(values)
     sizes = np.abs(values)
     bend = np.maximum(sizes[:-2], sizes[2:]) - sizes[1:-1]
-    bends = np.flatnonzero((sizes[1:-1] <= REACH * bend) & (sizes[1:-1] <= sizes[:-2])
+    bends = np.flatnonzero((sizes[1:-1] <= MAX_EXTREMUM_RATIO * bend) & (sizes[1:-1] <= sizes[:-2])
                            & (sizes[1:-1] <= sizes[2:])
                            & (np.sign(values[:-2]) == np.sign(values[1:-1]))
                            & (np.sign(values[1:-1]) == np.sign(values[2:]))) + 1
@@ -109,7 +109,7 @@ def _roots(function: Callable[[float], float], low: float, high: float) -> list[
             return 0.0
         return value
 
-    root = float(scipy.optimize.brentq(whole, low, high, xtol=EXACT, rtol=EXACT))
+    root = float(scipy.optimize.brentq(whole, low, high, xtol=ROOT_TOLERANCE, rtol=ROOT_TOLERANCE))
     if not gap:
         return [root]
     edges = [(end, _last(function, end, gap[0])) for end in (low, high)]
@@ -119,7 +119,7 @@ def _roots(function: Callable[[float], float], low: float, high: float) -> list[
 
 def _last(function: Callable[[float], float], inside: float, outside: float) -> float:
     """Return the last number at which the function is defined, towards one where it is not."""
-    while abs(outside - inside) > EXACT * max(1.0, abs(inside)):
+    while abs(outside - inside) > ROOT_TOLERANCE * max(1.0, abs(inside)):
         middle = 0.5 * (inside + outside)
         if np.isnan(function(middle)):
             outside = middle
@@ -130,17 +130,17 @@ def _last(function: Callable[[float], float], inside: float, outside: float) -> 
 
 #: Newton's method ends after a step this short; the error is of the order of its square.
 TOLERANCE = 1e-9
-NEWTON = 8
+NEWTON_ITERATIONS = 8
 #: Without an exact tangent it ends where the next step would be shorter than this.
-NEGLIGIBLE = 1e-4 * TOLERANCE
-#: FIRST, SHORTEST, LONGEST: lengths of steps along the curve, each unknown relative to its scale.
-FIRST, SHORTEST, LONGEST = 0.02, 1e-6, 0.2
+NEXT_STEP_TOLERANCE = 1e-4 * TOLERANCE
+#: Lengths of steps along the curve, each unknown relative to its scale.
+FIRST_STEP, MIN_STEP, MAX_STEP = 0.02, 1e-6, 0.2
 #: Once the period or the amplitude has grown by this factor, steps grow with it.
-GROWN = 3.0
-#: Least cosine of the angle between the tangents at neighbouring points.
-ALIGNED = 0.9
-#: Largest fraction of the amplitude in a step, so that no step leaps over the equilibrium.
-LARGEST_FALL = 0.6
+STEP_GROWTH_RATIO = 3.0
+#: Of the angle between the tangents at neighbouring points.
+MIN_COSINE = 0.9
+#: Fraction of the amplitude in a step, so that no step leaps over the equilibrium.
+MAX_AMPLITUDE_DROP = 0.6
 
 
 def derivatives(values: Callable[[np.ndarray], Any], x: np.ndarray, difference: float
@@ -347,7 +347,7 @@ def correct_point(curve: SolutionCurve, z: np.ndarray, border: np.ndarray, *, ex
     """
     before = 0.0
     with np.errstate(all='ignore'):
-        for count in range(1, NEWTON + 1):
+        for count in range(1, NEWTON_ITERATIONS + 1):
             try:
                 increment, direction = curve.step(z, border)
             except np.linalg.LinAlgError:
@@ -357,7 +357,7 @@ def correct_point(curve: SolutionCurve, z: np.ndarray, border: np.ndarray, *, ex
             if not size < 1.0 or z[-2] <= 0.0:
                 return None
             # Newton's next step is C size^2, with C = size / before^2 as in this one.
-            if size <= TOLERANCE or (not exact and size**3 <= NEGLIGIBLE * before**2):
+            if size <= TOLERANCE or (not exact and size**3 <= NEXT_STEP_TOLERANCE * before**2):
                 length = math.sqrt(curve.product(direction, direction))
                 return CurvePoint(curve, z, direction / length, count, 1.0 / length)
             before = size
@@ -468,15 +468,16 @@ def rate_along(point: CurvePoint) -> Callable[[float], float]:
 
 
 def _longest_step(point: CurvePoint) -> float:
-    """Return the longest step in which the amplitude falls by no more than LARGEST_FALL."""
+    """Return the longest step in which the amplitude falls by no more than MAX_AMPLITUDE_DROP."""
     size = point.amplitude
     ahead = point.curve.amplitude(point.z + 1e-3 * size * point.tangent)
     falling = (size - ahead) / (1e-3 * size)
-    return LARGEST_FALL * size / falling if falling > 0.0 else math.inf
+    return MAX_AMPLITUDE_DROP * size / falling if falling > 0.0 else math.inf
 
 
 def continue_curve(start: CurvePoint, low: float, high: float, visit: Callable[[CurvePoint], str],
-                   *, first_step: float = FIRST, longest_step: float = LONGEST, most: int = 200
+                   *, first_step: float = FIRST_STEP, longest_step: float = MAX_STEP,
+                   most: int = 200
                    ) -> tuple[list[int], str]:
     """Follow a curve from a point in the direction of its tangent.
 
@@ -499,22 +500,23 @@ def continue_curve(start: CurvePoint, low: float, high: float, visit: Callable[[
     count, point, step = 0, start, first_step
     while count < most:
         # Towards a homoclinic orbit only the period changes, ever faster.
-        longer = max(1.0, float(point.z[-2] / start.z[-2]) / GROWN, point.amplitude / GROWN)
+        longer = max(1.0, float(point.z[-2] / start.z[-2]) / STEP_GROWTH_RATIO,
+                     point.amplitude / STEP_GROWTH_RATIO)
         step = min(step, longest_step * longer, _longest_step(point))
-        if step < SHORTEST:
+        if step < MIN_STEP:
             return folds, 'lost'
         try:
             ahead = resolve_point(point.curve, point.z + step * point.tangent, point.tangent,
                                   exact=False)
         except NoOrbit:
             return folds, 'steep'
-        if ahead is None or ahead.cosine < ALIGNED:
+        if ahead is None or ahead.cosine < MIN_COSINE:
             step *= 0.5
             continue
         stations = [ahead]
         if ahead.rate * point.rate < 0.0:
             between = locate_fold(ahead, step)
-            if between is None and step > 100.0 * SHORTEST:
+            if between is None and step > 100.0 * MIN_STEP:
                 step *= 0.5
                 continue
             if between is not None:
@@ -533,6 +535,6 @@ def continue_curve(start: CurvePoint, low: float, high: float, visit: Callable[[
                 folds.append(count)
             count += 1
         point = ahead
-        if ahead.steps <= 3 and ahead.cosine > 1.0 - 0.3 * (1.0 - ALIGNED):
+        if ahead.steps <= 3 and ahead.cosine > 1.0 - 0.3 * (1.0 - MIN_COSINE):
             step *= 1.5
     return folds, 'steps'

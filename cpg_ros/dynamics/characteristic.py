@@ -28,8 +28,8 @@ import math
 import numpy as np
 import scipy
 
-#: Largest distance from the unit circle, and from the axis, that is due to rounding.
-ON_CIRCLE = 1e-7
+#: Distance from the unit circle, and from the axis, that is due to rounding.
+CIRCLE_TOLERANCE = 1e-7
 
 
 def frequencies(a: complex, b: complex) -> list[float]:
@@ -74,10 +74,10 @@ def delay_crossings(now: np.ndarray, past: np.ndarray) -> list[tuple[float, floa
     right = np.block([[np.eye(size), np.zeros((size, size))], [np.zeros((size, size)), first]])
     with np.errstate(all='ignore'):
         values = scipy.linalg.eigvals(left, right)
-    for z in values[np.isfinite(values) & (np.abs(np.abs(values) - 1.0) < ON_CIRCLE)]:
+    for z in values[np.isfinite(values) & (np.abs(np.abs(values) - 1.0) < CIRCLE_TOLERANCE)]:
         z = complex(z / abs(z))
         for root in np.linalg.eigvals(now + past * z):
-            close = ON_CIRCLE * (1.0 + abs(root))
+            close = CIRCLE_TOLERANCE * (1.0 + abs(root))
             crossing = ((float(root.imag), _delay(z, float(root.imag)))
                         if root.imag > close else None)
             if crossing and abs(root.real) < close and not any(
@@ -87,12 +87,11 @@ def delay_crossings(now: np.ndarray, past: np.ndarray) -> list[tuple[float, floa
 
 
 #: Exponent above which exp overflows, so that W is computed from a logarithm.
-LARGEST = 690.0
-#: POINTS, MOST_POINTS: first and largest number of Chebyshev points; RESOLVED: relative change by
-#: Newton's method up to which a root is resolved.
-POINTS, MOST_POINTS, RESOLVED = 24, 192, 1e-6
+MAX_EXPONENT = 690.0
+#: Numbers of Chebyshev points; relative change by Newton's method up to which a root is resolved.
+MIN_POINTS, MAX_POINTS, NEWTON_TOLERANCE = 24, 192, 1e-6
 #: Roots computed first in the search for all to the right of a line.
-FIRST = 9
+NUM_ROOTS = 9
 
 
 def rightmost_first(values: np.ndarray) -> np.ndarray:
@@ -132,7 +131,7 @@ def characteristic_roots(now: np.ndarray, past: np.ndarray, delay: float, count:
 def roots_right_of(bound: float, now: np.ndarray, past: np.ndarray, delay: float,
                    real: bool = False) -> np.ndarray:
     """Return all roots whose real part is above a bound, by descending real part."""
-    count = FIRST
+    count = NUM_ROOTS
     while True:
         roots = characteristic_roots(now, past, delay, count, real)
         if len(roots) < count or roots[-1].real <= bound:
@@ -150,7 +149,7 @@ def characteristic_matrix(root: complex, now: np.ndarray, past: np.ndarray, dela
 def _branches(a: complex, b: complex, tau: float, n: np.ndarray) -> np.ndarray:
     """W_n(b tau exp(-a tau)), shape like n."""
     exponent = -a * tau
-    if abs(exponent.real) <= LARGEST:
+    if abs(exponent.real) <= MAX_EXPONENT:
         return scipy.special.lambertw(b * tau * np.exp(exponent), n)
     # W_n(z) = L - log L + ... with L = log z + 2 pi i n large (Corless et al. 1996);
     # Newton's method on w + log w = L, whatever the sheet of the logarithm.
@@ -188,13 +187,13 @@ def _generator(now: np.ndarray, past: np.ndarray, delay: float, points: int) -> 
 
 def _discretised(now: np.ndarray, past: np.ndarray, delay: float, count: int) -> np.ndarray:
     """Return at least count rightmost roots, with more points until these are resolved."""
-    points = max(POINTS, 2 * count)
+    points = max(MIN_POINTS, 2 * count)
     while True:
         rough = rightmost_first(np.linalg.eigvals(
             _generator(now, past, delay, points)).astype(complex))[:count + 1]
         exact = np.array([_refined(root, now, past, delay) for root in rough])
-        moved = np.abs(exact - rough) <= RESOLVED * (1.0 + np.abs(exact))
-        if moved.all() or points >= MOST_POINTS:
+        moved = np.abs(exact - rough) <= NEWTON_TOLERANCE * (1.0 + np.abs(exact))
+        if moved.all() or points >= MAX_POINTS:
             return exact
         points *= 2
 

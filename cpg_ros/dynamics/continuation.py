@@ -41,15 +41,15 @@ import numpy as np
 
 # The ends of branches, extrapolated beyond the last orbit.
 
-#: A branch ends near a homoclinic orbit if its period has grown by the factor GROWN while the
-#: value changes by less than STILL of its scale per period.
-GROWN, STILL = 3.0, 1e-2
-#: The period grows alone in a step in which it grows by the fraction LONGER while the value
-#: changes by less than ROUNDING of its scale.
-LONGER, ROUNDING = 0.01, 1e-9
+#: A branch ends near a homoclinic orbit if its period has grown by this factor while the value
+#: changes by less than this fraction of its scale per period.
+MIN_PERIOD_RATIO, VALUE_TOLERANCE = 3.0, 1e-2
+#: The period grows alone in a step in which it grows by this fraction while the value changes by
+#: less than ROUNDING of its scale.
+MIN_PERIOD_GROWTH, ROUNDING = 0.01, 1e-9
 #: Near a saddle-node the slope of the value falls as the period to the power -3; a fall from this
 #: power on is taken for an exponential one.
-STEEPER = 4.0
+MAX_SNIC_POWER = 4.0
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ class BranchEnd:
 
 def grows_alone(values: np.ndarray, periods: np.ndarray, scale: float) -> bool:
     """Whether between two points the period grows and the value no longer changes."""
-    return bool(len(values) > 1 and abs(np.diff(periods)) > LONGER * periods[0]
+    return bool(len(values) > 1 and abs(np.diff(periods)) > MIN_PERIOD_GROWTH * periods[0]
                 and abs(np.diff(values)) < ROUNDING * scale)
 
 
@@ -95,10 +95,10 @@ def without_period(values: np.ndarray, periods: np.ndarray, scale: float) -> flo
         scale: of the values.
 
     """
-    if periods.size < 4 or not periods[-1] > GROWN * periods.min():
+    if periods.size < 4 or not periods[-1] > MIN_PERIOD_RATIO * periods.min():
         return None
     slopes, middle = _slopes(values, periods)
-    if not abs(slopes[-1]) * periods[-1] < STILL * scale:
+    if not abs(slopes[-1]) * periods[-1] < VALUE_TOLERANCE * scale:
         return None
     if _winds(slopes):
         # In ever smaller windings: the last value is the best estimate.
@@ -107,7 +107,7 @@ def without_period(values: np.ndarray, periods: np.ndarray, scale: float) -> flo
     power = fall / np.log(middle[2] / middle[0])
     if power <= 1.5:
         return None
-    if power < STEEPER:
+    if power < MAX_SNIC_POWER:
         last = slopes[2] * (middle[2] / periods[-1])**power
         return float(values[-1] + last * periods[-1] / (power - 1.0))
     rate = fall / (middle[2] - middle[0])
@@ -132,7 +132,7 @@ def law_of_growth(values: np.ndarray, periods: np.ndarray) -> str | None:
     if _winds(slopes):
         return 'homoclinic'
     power = np.log(slopes[0] / slopes[2]) / np.log(middle[2] / middle[0])
-    return None if power <= 1.5 else 'SNIC' if power < STEEPER else 'homoclinic'
+    return None if power <= 1.5 else 'SNIC' if power < MAX_SNIC_POWER else 'homoclinic'
 
 
 def _slopes(values: np.ndarray, periods: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -145,9 +145,9 @@ def _winds(slopes: np.ndarray) -> bool:
     return bool(not slopes.all() or (np.sign(slopes) != np.sign(slopes[-1])).any())
 
 
-#: REST: amplitude, over the curve's sizes, below which an orbit counts as its Hopf point; POINTS:
-#: of a cycle over which these are taken.
-REST, POINTS = 1e-3, 256
+#: Amplitude, over the curve's sizes, below which an orbit counts as its Hopf point; points of a
+#: cycle over which these are taken.
+MIN_AMPLITUDE, POINTS = 1e-3, 256
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -413,7 +413,7 @@ def _run(start: CurvePoint, low: float, high: float, period: float, limits: Step
     def visit(located: CurvePoint) -> str:
         points.append(_point(located))
         orbit = points[-1].orbit
-        if located.amplitude < REST:
+        if located.amplitude < MIN_AMPLITUDE:
             return 'rest'
         if orbit.period > longest or grows_alone(*_values_and_periods(points[-2:]), high - low):
             return 'period'
@@ -448,11 +448,11 @@ def _check(network: Network, symmetry: Symmetry, along: ParameterLine, low: floa
 
 
 #: Tolerance of a crossing, as a fraction of the way between two points of a branch.
-CROSSING = 1e-7
+CROSSING_TOLERANCE = 1e-7
 #: A multiplier whose logarithm stays below this is neutral and does not cross.
-NEUTRAL = 1e-6
-#: REAL: imaginary part up to which a multiplier is real.
-REAL = 1e-3
+NEUTRAL_TOLERANCE = 1e-6
+#: Imaginary part up to which a multiplier is real.
+IMAGINARY_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -479,7 +479,7 @@ class Bifurcation(ShortRepr):
 
 
 def bifurcations(branch: Branch, spectra: Sequence[Multipliers] | None = None,
-                 exact: float = CROSSING) -> tuple[Bifurcation, ...]:
+                 exact: float = CROSSING_TOLERANCE) -> tuple[Bifurcation, ...]:
     """Locate all crossings of the unit circle between the points of a branch, in its order.
 
     Two opposite crossings in the same subspace between the same points are not found.
@@ -523,7 +523,7 @@ def _crossings(branch: Branch, spectra: list[list[np.ndarray]]) -> Iterator[tupl
                 # At a fold one multiplier of the class is 1, to rounding.
                 if part == 0 and folds and any(abs(mu - 1.0) < 1e-3 for mu in pair):
                     continue
-                if max(abs(np.log(np.abs(mu))) for mu in pair) > NEUTRAL:
+                if max(abs(np.log(np.abs(mu))) for mu in pair) > NEUTRAL_TOLERANCE:
                     yield k, part, rank
 
 
@@ -579,5 +579,5 @@ def _located(ends: Sequence[BranchPoint], spectra: Sequence[list[np.ndarray]], p
 
 def kind_of(multiplier: complex) -> str:
     """Return the kind of bifurcation at which a multiplier crosses the unit circle."""
-    return ('torus' if abs(multiplier.imag) > REAL else
+    return ('torus' if abs(multiplier.imag) > IMAGINARY_TOLERANCE else
             'period doubling' if multiplier.real < 0.0 else 'branch point')

@@ -48,16 +48,16 @@ from cpg_ros.networks.symmetry import Group, label, subgroups
 import numpy as np
 
 #: Grid of x on which equilibria are searched: dense where the cell's functions bend.
-_FAR = np.geomspace(3.0, 100.0, 400)[1:]
-GRID = np.concatenate([-_FAR[::-1], np.linspace(-3.0, 3.0, 2001), _FAR])
+_TAIL = np.geomspace(3.0, 100.0, 400)[1:]
+GRID = np.concatenate([-_TAIL[::-1], np.linspace(-3.0, 3.0, 2001), _TAIL])
 #: Start states where there is no such x.
-STARTS = 400
-#: LONGEST: largest relative change of the state in a step; MISS: largest error of its prediction.
-LONGEST, MISS = 0.1, 0.01
+NUM_STARTS = 400
+#: Relative change of the state in a step of the couplings; error of its prediction.
+MAX_CHANGE, PREDICTION_TOLERANCE = 0.1, 0.01
 #: Size at which an equilibrium has gone to infinity.
-FURTHEST = 1e3
-#: Shortest step of the coupling fraction; a shorter one means a fold.
-SHORTEST = 1e-5
+MAX_STATE = 1e3
+#: Step of the coupling fraction; a shorter one means a fold.
+MIN_COUPLING_STEP = 1e-5
 
 
 class NoEquilibrium(CpgError):
@@ -210,7 +210,7 @@ def _roots(cell: Quotient, scanned: int) -> Iterator[np.ndarray]:
         yield state
 
 
-def _scattered(n: int, count: int = STARTS) -> np.ndarray:
+def _scattered(n: int, count: int = NUM_STARTS) -> np.ndarray:
     rng = np.random.default_rng(0)
     return rng.uniform(-1.0, 1.0, (count, n)) * rng.choice([1.0, 3.0, 30.0], (count, 1))
 
@@ -245,19 +245,19 @@ def equilibrium(network: Network) -> np.ndarray:
         change = -step * np.linalg.solve(slope, cell.push(state))
         size, new = 1.0 + np.abs(state).max(), None
         cell.set_coupling(fraction + step)
-        if np.abs(change).max() <= LONGEST * size:
+        if np.abs(change).max() <= MAX_CHANGE * size:
             new = cell.newton(state + change)
         ahead = slope if new is None else cell.together(new)[1]
         # Beyond a fold the determinant has the other sign.
-        if (new is not None and np.abs(new - state - change).max() <= MISS * size
+        if (new is not None and np.abs(new - state - change).max() <= PREDICTION_TOLERANCE * size
                 and np.linalg.det(ahead) * np.linalg.det(slope) > 0.0):
             state, slope = new, ahead
             fraction, step, grow = fraction + step, grow * step, 2.0
         else:
             cell.set_coupling(fraction)
             step, grow = 0.5 * step, 1.0
-        if step < SHORTEST < 1.0 - fraction or size > FURTHEST:
-            how = 'in a fold' if size <= FURTHEST else 'to infinity'
+        if step < MIN_COUPLING_STEP < 1.0 - fraction or size > MAX_STATE:
+            how = 'in a fold' if size <= MAX_STATE else 'to infinity'
             listed = ', '.join(f'{name} {value:.4f}' for name, value
                                in named(network, state).items())
             raise NoEquilibrium(f'the equilibrium is lost {how} at {fraction:.4f} of the '
@@ -289,14 +289,14 @@ def _check(network: Network) -> None:
 # All equilibria, and their branches.
 
 #: Starts of Newton's method in each fixed-point space.
-IN_EACH = 100
+NUM_SUBSPACE_STARTS = 100
 #: Relative difference of equal states, and of those next to a pitchfork; root over the largest
 #: that is 0.
-SAME, NEAR, ZERO = 1e-6, 1e-3, 1e-7
+STATE_TOLERANCE, PITCHFORK_TOLERANCE, ROOT_TOLERANCE = 1e-6, 1e-3, 1e-7
 #: Rate of the value along a branch, and part of a root over the largest, that is not 0.
-TURNS = 1e-4
-#: MOST: points of a branch, in either direction; STEP: longest, over the range of the parameter.
-MOST, STEP = 200, 0.05
+NONZERO_THRESHOLD = 1e-4
+#: Points of a branch in either direction; step over the range of the parameter.
+MAX_POINTS, MAX_STEP = 200, 0.05
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -342,7 +342,7 @@ class Equilibrium(ShortRepr):
         """Whether small disturbances decay; None: cannot tell, as a root is 0 up to rounding."""
         scale = max(np.abs(block.now).max() for block in self.blocks)
         root = self.leading.real
-        return None if abs(root) <= ZERO * scale else root < 0.0
+        return None if abs(root) <= ROOT_TOLERANCE * scale else root < 0.0
 
 
 def _images(network: Network, state: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
@@ -356,7 +356,7 @@ def _images(network: Network, state: np.ndarray) -> Iterator[tuple[str, np.ndarr
             yield '', -image.ravel()
 
 
-def _equal(one: np.ndarray, other: np.ndarray, same: float = SAME) -> bool:
+def _equal(one: np.ndarray, other: np.ndarray, same: float = STATE_TOLERANCE) -> bool:
     return bool(np.abs(one - other).max() <= same * (1.0 + np.abs(one).max()))
 
 
@@ -386,7 +386,7 @@ def all_equilibria(network: Network) -> list[Equilibrium]:
     middle = alike[0] if len(alike) else np.zeros(network.components)
     for names in reversed(subgroups(group)):
         cell = Quotient(network, group.subgroup(names).orbits)
-        starts = _scattered(cell.kept.size, IN_EACH)
+        starts = _scattered(cell.kept.size, NUM_SUBSPACE_STARTS)
         starts = np.concatenate([starts, middle[cell.kept] + starts
                                  * (1.0 + np.abs(middle[cell.kept])) / 3.0])
         reached = [*alike] if names == tuple(group.elements) else [
@@ -532,7 +532,7 @@ def continue_equilibrium(start: Equilibrium, line: ParameterLine | str, low: flo
             points.append(point)
             return ''
 
-        folds, _ = continue_curve(begin, low, high, visit, longest_step=STEP, most=MOST)
+        folds, _ = continue_curve(begin, low, high, visit, longest_step=MAX_STEP, most=MAX_POINTS)
         met: list[Crossing] = []
         ends = [(point, point.curve.orbit(point.z)) for point in points]
         for k, (last, now) in enumerate(pairwise(ends)):
@@ -568,19 +568,20 @@ def _crossing(point: CurvePoint, which: int, rank: int) -> Iterator[Crossing]:
     block = equilibrium.blocks[which]
     root, values = complex(block.roots(rank + 1)[-1]), block.representation.values
     along = point.rate * fixed_unknown(point.z.size, -1)
-    if abs(root.imag) > TURNS * np.abs(block.now).max():
+    if abs(root.imag) > NONZERO_THRESHOLD * np.abs(block.now).max():
         if root.imag > 0.0:
             yield Crossing('Hopf', point.value, equilibrium, block, root.imag)
-    elif point.curve.product(along, along) > TURNS**2:
+    elif point.curve.product(along, along) > NONZERO_THRESHOLD**2:
         mirrored = block.copies == 1 and (values.real.min() < 0.0 or (
-            block.symmetry.odd and np.abs(equilibrium.state).max() <= SAME))
+            block.symmetry.odd and np.abs(equilibrium.state).max() <= STATE_TOLERANCE))
         yield Crossing('pitchfork' if mirrored else 'branch point', point.value, equilibrium,
                        block, 0.0)
 
 
 def _fold(point: CurvePoint, begin: CurvePoint) -> Crossing:
     """Return what happens where a branch turns round: at a pitchfork it begins."""
-    images = [[_equal(image, one.state, NEAR) for _, image in _images(one.network, one.state)]
+    images = [[_equal(image, one.state, PITCHFORK_TOLERANCE)
+               for _, image in _images(one.network, one.state)]
               for one in (point.curve.orbit(point.z), begin.curve.orbit(begin.z))]
     equilibrium = point.curve.orbit(point.z)
     return Crossing('pitchfork' if sum(images[0]) > sum(images[1]) else 'fold', point.value,

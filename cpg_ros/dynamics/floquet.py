@@ -27,14 +27,14 @@ from cpg_ros.dynamics.orbit_method import orbit_method
 import numpy as np
 import scipy
 
-#: A multiplier above this is not distinguished from 1.
-ATTRACTS = 1.0 - 1e-7
+#: Modulus above which a multiplier is not distinguished from 1.
+MAX_STABLE_MODULUS = 1.0 - 1e-7
 #: Gains at which the growth is computed in the search for the smallest sufficient one.
-GAINS = 8
+NUM_GAINS = 8
 #: Error of the growth during that search.
-ROUGHLY = 1e-4
-#: MOST_GAINS: number of gains that are tried where no bound is known.
-MOST_GAINS = 40
+GROWTH_TOLERANCE = 1e-4
+#: Gains that are tried where no bound is known.
+MAX_ITERATIONS = 40
 #: Names of the values of stable().
 VERDICTS = {True: 'stable', False: 'unstable', None: 'cannot tell'}
 
@@ -47,7 +47,7 @@ def stable(modulus: float, error: float = 0.0) -> bool | None:
         error: of the modulus; at least 1e-7 is assumed.
 
     """
-    error = max(error, 1.0 - ATTRACTS)
+    error = max(error, 1.0 - MAX_STABLE_MODULUS)
     return None if abs(modulus - 1.0) <= error else modulus < 1.0
 
 
@@ -104,7 +104,8 @@ class Multipliers(ShortRepr):
     @property
     def unstable(self) -> int:
         """Number of multipliers that are not inside the unit circle, except the trivial one."""
-        return sum(int((np.abs(part) >= ATTRACTS).sum()) for part in (self.within, *self.parts))
+        return sum(int((np.abs(part) >= MAX_STABLE_MODULUS).sum())
+                   for part in (self.within, *self.parts))
 
     @property
     def error(self) -> float:
@@ -153,8 +154,8 @@ def attracts_with(orbit: Orbit, gain: float) -> bool | None:
     inside = multipliers_within(orbit)
     if not inside.attracts:
         return inside.attracts
-    largest = _largest_outside(orbit, gain, ROUGHLY)
-    if abs(largest - ATTRACTS) <= 10.0 * ROUGHLY:
+    largest = _largest_outside(orbit, gain, GROWTH_TOLERANCE)
+    if abs(largest - MAX_STABLE_MODULUS) <= 10.0 * GROWTH_TOLERANCE:
         largest = _largest_outside(orbit, gain)
     return stable(largest, inside.error)
 
@@ -175,8 +176,8 @@ def smallest_gain(orbit: Orbit) -> float:
         return max(0.0, growth(0.0) / orbit.period)
     # With a delay the growth need not fall evenly with the gain: search downward.
     enough = sufficient_gain(orbit, 0.0)
-    for gain in enough * np.arange(GAINS - 1, -1, -1) / GAINS:
-        if growth(gain, ROUGHLY) >= -ROUGHLY:
+    for gain in enough * np.arange(NUM_GAINS - 1, -1, -1) / NUM_GAINS:
+        if growth(gain, GROWTH_TOLERANCE) >= -GROWTH_TOLERANCE:
             if growth(gain) < 0.0:
                 enough = gain
                 continue
@@ -195,7 +196,7 @@ def sufficient_gain(orbit: Orbit, rate: float) -> float:
     if bound is not None:
         return bound
     gain = 0.0
-    for _ in range(MOST_GAINS):
+    for _ in range(MAX_ITERATIONS):
         largest = _largest_outside(orbit, gain)
         growth = np.log(largest) / orbit.period + rate if largest > 0.0 else -np.inf
         if growth <= 1e-9:

@@ -51,7 +51,7 @@ from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 
 #: Fraction of its terms below which a cubic coefficient is 0.
-VANISHES = 1e-10
+CUBIC_TOLERANCE = 1e-10
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class NormalForm:
     @property
     def degenerate(self) -> bool:
         """Whether the cubic coefficient vanishes, Re k2 = 0, up to rounding."""
-        return abs(self.k2.real) <= VANISHES * self.size
+        return abs(self.k2.real) <= CUBIC_TOLERANCE * self.size
 
     @property
     def supercritical(self) -> bool:
@@ -110,7 +110,7 @@ class NormalForm:
 
 
 #: Distance from the imaginary axis, over omega, below which a root lies on it.
-ON_AXIS = 1e-8
+AXIS_TOLERANCE = 1e-8
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -292,7 +292,7 @@ class HopfPoint(ShortRepr):
     @cached_property
     def _others(self) -> tuple[tuple[Block, np.ndarray], ...]:
         """All blocks with their other roots on the axis and to the right of it."""
-        close = ON_AXIS * self.omega
+        close = AXIS_TOLERANCE * self.omega
         return tuple((block, self.but_critical(block, block.right_of(-close)))
                      for block in blocks(self.network, self.rest))
 
@@ -304,7 +304,7 @@ class HopfPoint(ShortRepr):
             for block in blocks(self.network, self.rest)]))[0])
 
     def _right(self, within: bool) -> int:
-        close = ON_AXIS * self.omega
+        close = AXIS_TOLERANCE * self.omega
         return int(sum((roots.real > close).sum() * (
             other.copies - (0 if within else other.inside(self.block)))
             for other, roots in self._others))
@@ -322,7 +322,7 @@ class HopfPoint(ShortRepr):
     @property
     def simple(self) -> bool:
         """Whether no other root lies on the imaginary axis."""
-        return all((roots.real > ON_AXIS * self.omega).all()
+        return all((roots.real > AXIS_TOLERANCE * self.omega).all()
                    for _, roots in self._others)
 
     @property
@@ -416,9 +416,9 @@ def crossing_at(block: Block, line: ParameterLine, rest: np.ndarray, omega: floa
 # All Hopf points of a network's equilibrium along a line of parameters.
 
 #: Points of the grid between which crossings are refined.
-GRID = 241
+GRID_SIZE = 241
 #: Roots of a class that are followed with a delay, beside those to the right of the axis.
-SPARE = 2
+NUM_EXTRA_ROOTS = 2
 
 
 def hopf_points(network: Network, line: ParameterLine | str, low: float, high: float
@@ -508,7 +508,7 @@ def _on_grid(network: Network, line: ParameterLine, low: float, high: float) -> 
         # Cells whose delayed input has the weight 0 have fewer.
         return np.pad(listed, (0, count - len(listed)), constant_values=np.nan)
 
-    grid = _with_edges([float(value) for value in np.linspace(low, high, GRID)],
+    grid = _with_edges([float(value) for value in np.linspace(low, high, GRID_SIZE)],
                        lambda value: bool(split(value)))
     if not any(split(value) for value in grid):
         equilibrium(line.at(network, low))
@@ -524,7 +524,7 @@ def _on_grid(network: Network, line: ParameterLine, low: float, high: float) -> 
                 # Two roots of a block may cross together; each then appears twice.
                 for root in roots(value, which, count):
                     omega = float(root.imag)
-                    if (omega > 0.0 and abs(root.real) <= ON_AXIS * omega
+                    if (omega > 0.0 and abs(root.real) <= AXIS_TOLERANCE * omega
                             and not any(np.allclose((value, omega), pair) for pair in pairs)):
                         pairs.append((value, omega))
                         block = split(value)[which]
@@ -534,7 +534,7 @@ def _on_grid(network: Network, line: ParameterLine, low: float, high: float) -> 
                                              point.omega, point.mode))
 
 
-def tracked_roots(along: list[Block], spare: int = SPARE) -> int:
+def tracked_roots(along: list[Block], spare: int = NUM_EXTRA_ROOTS) -> int:
     """Return how many roots of a class to follow along some blocks: without a delay, all."""
     if not any(block.past.any() for block in along):
         return len(along[0].now)

@@ -82,7 +82,7 @@ def _halves(basis: np.ndarray, image: np.ndarray) -> list[np.ndarray]:
 # Irreducible representations in which a group permutes cells.
 
 #: Difference of two characters, and of two vectors of length 1, that is rounding.
-SAME = 1e-9
+ROUNDING_TOLERANCE = 1e-9
 
 
 def _units(shifts: np.ndarray) -> np.ndarray:
@@ -134,7 +134,7 @@ class Representation(ShortRepr):
                 image = image - column * (column.conj() @ image)
             if np.linalg.norm(image) > 1e-6:
                 # The first cell that it moves has phase 0.
-                first = image[np.flatnonzero(np.abs(image) > SAME)[0]]
+                first = image[np.flatnonzero(np.abs(image) > ROUNDING_TOLERANCE)[0]]
                 columns.append(image * (abs(first) / first) / np.linalg.norm(image))
         out = np.array(columns).reshape(-1, group.cells).T
         return out.real.astype(complex) if symmetry.self_conjugate else out
@@ -164,7 +164,8 @@ class Representation(ShortRepr):
         other = replace(self, symmetry=known)
         for name in group.elements.keys() - set(known.h):
             image = _moved(group, [name], [1.0], other.columns)
-            if abs(np.vdot(other.columns, image)) > (1.0 - SAME) * other.columns.shape[1]:
+            if abs(np.vdot(other.columns, image)) > (
+                    1.0 - ROUNDING_TOLERANCE) * other.columns.shape[1]:
                 return None
         return other
 
@@ -209,7 +210,7 @@ def representations(group: Group, variables: int, odd: bool) -> tuple[Representa
             (generators(group, h) for h in reversed(subgroups(group)))))
     for symmetry in candidates:
         values = _induced(symmetry)
-        if (abs((np.abs(values)**2).mean() - 1.0) < SAME
+        if (abs((np.abs(values)**2).mean() - 1.0) < ROUNDING_TOLERANCE
                 and not any(np.allclose(values, one.values) for one in found)):
             found.append(Representation(symmetry, values))
         if sum(one.dimension**2 for one in found) == len(group.elements):
@@ -341,7 +342,7 @@ class Block(ShortRepr):
     def vector(self) -> np.ndarray:
         """Disturbance of the cells, 1 for the first that it moves, shape (cells,)."""
         column = self.representation.columns[:, 0]
-        return np.asarray(column / column[np.flatnonzero(np.abs(column) > SAME)[0]])
+        return np.asarray(column / column[np.flatnonzero(np.abs(column) > ROUNDING_TOLERANCE)[0]])
 
     @property
     def leading(self) -> complex:

@@ -28,10 +28,10 @@ from cpg_ros.networks.network import asymmetry, MAX_ASYMMETRY, Network, other_ga
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 
-#: Width of the range that deflation keeps free about a known period, relative to it.
-WIDTH = 0.1
-#: Largest factor of deflation, which has a pole.
-LARGEST = 3.0
+#: Of the range that deflation keeps free about a known period, relative to it.
+DEFLATION_WIDTH = 0.1
+#: The factor of deflation has a pole.
+MAX_DEFLATION = 3.0
 
 
 def deflation_factor(period: float, step: float, periods: Sequence[float]) -> float:
@@ -46,9 +46,9 @@ def deflation_factor(period: float, step: float, periods: Sequence[float]) -> fl
     slope = 0.0
     for other in periods:
         x = period / other - 1.0 or 1e-12
-        slope -= 2.0 * WIDTH**2 / (x * (x * x + WIDTH**2)) / other
+        slope -= 2.0 * DEFLATION_WIDTH**2 / (x * (x * x + DEFLATION_WIDTH**2)) / other
     factor = 1.0 / (1.0 - slope * step or 1e-12)
-    return max(-LARGEST, min(LARGEST, factor))
+    return max(-MAX_DEFLATION, min(MAX_DEFLATION, factor))
 
 
 #: States, shape (m, components), as a function of times in cycles, shape (m,).
@@ -60,11 +60,11 @@ NOT_ISOLATED = ('the orbit is not isolated, so its phase has no response: a dist
                 'than along it does not decay, either')
 #: Grid on which extremes are searched before they are refined.
 POINTS = 1024
-#: COMPARED: fewest points at which signals are compared; PARTS: numbers of equal parts of a cycle
-#: that an orbit must not repeat.
-COMPARED, PARTS = 60, np.array([2, 3, 5, 7, 11, 13, 17, 19])
+#: MIN_SIGNAL_POINTS: at which signals are compared; PARTS: numbers of equal parts of a cycle that
+#: an orbit must not repeat.
+MIN_SIGNAL_POINTS, PARTS = 60, np.array([2, 3, 5, 7, 11, 13, 17, 19])
 #: Difference of two equal signals, over their range.
-SAME = 1e-4
+SIGNAL_TOLERANCE = 1e-4
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -107,7 +107,7 @@ class Orbit(ShortRepr, ABC):
         states = finer(theta * finer.period)
         sizes = np.ptp(states, axis=0).reshape(self.network.variables, -1).max(axis=1)
         # A variable that stands still has no range.
-        sizes = np.maximum(sizes, SAME * np.abs(states).max())
+        sizes = np.maximum(sizes, SIGNAL_TOLERANCE * np.abs(states).max())
         gaps = np.abs(states - self(self.between)).max(axis=0) / sizes.repeat(self.network.cells)
         return float(max(gaps.max(), abs(finer.period / self.period - 1.0)))
 
@@ -266,16 +266,16 @@ def extra_symmetry(orbit: Orbit) -> str:
     skip, and for several revolutions of an orbit.
     """
     # A multiple of the denominator of every possible shift.
-    points = math.lcm(orbit.symmetry.group.exponent, COMPARED)
+    points = math.lcm(orbit.symmetry.group.exponent, MIN_SIGNAL_POINTS)
     theta, cells = np.arange(points) / points, orbit.network.cells
     x = orbit(theta * orbit.period)[:, :cells]
     # A single time excludes nearly all of them.
     again = np.abs(orbit(orbit.period / PARTS)[:, :cells] - x[0]).max(axis=1)
-    for parts in PARTS[again < SAME * np.ptp(x)]:
+    for parts in PARTS[again < SIGNAL_TOLERANCE * np.ptp(x)]:
         later = orbit((theta + 1.0 / parts) * orbit.period)[:, :cells]
-        if np.abs(later - x).max() < SAME * np.ptp(x):
+        if np.abs(later - x).max() < SIGNAL_TOLERANCE * np.ptp(x):
             return f'it repeats {parts} times'
-    return signal_symmetry(orbit.symmetry, x, SAME)
+    return signal_symmetry(orbit.symmetry, x, SIGNAL_TOLERANCE)
 
 
 def signal_symmetry(symmetry: Symmetry, x: np.ndarray, same: float) -> str:

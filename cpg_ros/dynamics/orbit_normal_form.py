@@ -36,7 +36,7 @@ from typing import Any
 
 from cpg_ros.common.errors import ShortRepr
 from cpg_ros.dynamics.arclength import NoOrbit
-from cpg_ros.dynamics.continuation import REAL
+from cpg_ros.dynamics.continuation import IMAGINARY_TOLERANCE
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.orbit import Orbit
 from cpg_ros.dynamics.orbit_method import orbit_method
@@ -47,7 +47,7 @@ import scipy
 # The variational equation about an orbit where it is singular: null vectors and solutions.
 
 #: Iterations in which the null vectors become the borders of the next system.
-ROUNDS = 2
+NUM_ITERATIONS = 2
 
 
 class _Bordered:
@@ -111,7 +111,7 @@ class Linearised:
         """
         matrix = self.equation.matrix(factor)
         rights = lefts = guesses / np.linalg.norm(guesses, axis=1)[:, None]
-        for _ in range(ROUNDS):
+        for _ in range(NUM_ITERATIONS):
             system = _Bordered(matrix, rights, lefts)
             rights, lefts = system.null(False), system.null(True)
         self._systems[factor] = _Bordered(matrix, rights, lefts), lefts
@@ -143,15 +143,15 @@ class Linearised:
         return np.zeros_like(y[0]), past
 
 
-#: CRITICAL: distance from the unit circle up to which a multiplier is on it; RESONANT: distance of
-#: a power of it from 1 up to which there is a resonance.
-CRITICAL, RESONANT = 1e-3, 0.02
-#: Largest relative change of a coefficient when the mesh is halved.
-SAME = 0.01
+#: Distance from the unit circle up to which a multiplier is on it, and of a power of it from 1 up
+#: to which there is a resonance.
+CIRCLE_TOLERANCE, RESONANCE_TOLERANCE = 1e-3, 0.02
+#: Relative change of a coefficient when the mesh is halved.
+MESH_TOLERANCE = 0.01
 #: Modulus above which a multiplier grows at a crossing of another one.
-GROWS = 1.001
+GROWTH_THRESHOLD = 1.001
 #: Fraction of its terms below which a coefficient is 0.
-NOTHING = 1e-6
+ZERO_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -192,7 +192,7 @@ def orbit_normal_form(orbit: Orbit, multiplier: complex, part: int) -> OrbitNorm
         part: index of its subspace: 0 for the gait's class, then the transverse ones.
 
     """
-    pair = abs(multiplier.imag) > REAL
+    pair = abs(multiplier.imag) > IMAGINARY_TOLERANCE
     if why := _undecided(orbit, multiplier, pair):
         return OrbitNormalForm(complex('nan'), why)
     try:
@@ -200,7 +200,7 @@ def orbit_normal_form(orbit: Orbit, multiplier: complex, part: int) -> OrbitNorm
                  for halvings in (0, 1)]
     except (NoOrbit, np.linalg.LinAlgError, RuntimeError) as error:
         return OrbitNormalForm(complex('nan'), str(error))
-    if abs(forms[1].real - forms[0].real) > SAME * abs(forms[1].real):
+    if abs(forms[1].real - forms[0].real) > MESH_TOLERANCE * abs(forms[1].real):
         return OrbitNormalForm(forms[1], f'c is {forms[0]:.3g} or {forms[1]:.3g}, by the mesh')
     return OrbitNormalForm(forms[1])
 
@@ -208,17 +208,17 @@ def orbit_normal_form(orbit: Orbit, multiplier: complex, part: int) -> OrbitNorm
 def loses_stability(orbit: Orbit) -> bool:
     """Whether all multipliers but the crossing one are inside the unit circle."""
     spectrum = multipliers(orbit)
-    return bool((np.abs([*spectrum.within, *spectrum.transverse]) < GROWS).all())
+    return bool((np.abs([*spectrum.within, *spectrum.transverse]) < GROWTH_THRESHOLD).all())
 
 
 def _undecided(orbit: Orbit, multiplier: complex, pair: bool) -> str:
     """Return why a normal form with one disturbance does not apply, or ''."""
     spectrum = multipliers(orbit)
     moduli = np.abs(np.concatenate([spectrum.within, spectrum.transverse]))
-    if (np.abs(moduli - 1.0) < CRITICAL).sum() > 1 + pair:
+    if (np.abs(moduli - 1.0) < CIRCLE_TOLERANCE).sum() > 1 + pair:
         return 'other multipliers are on the unit circle, too'
     for power in (1, 2, 3, 4):
-        if pair and abs(multiplier**power - 1.0) < RESONANT:
+        if pair and abs(multiplier**power - 1.0) < RESONANCE_TOLERANCE:
             return f'the resonance 1:{power} is near'
     return ''
 
@@ -258,7 +258,7 @@ def _cubic(linear: Linearised, multiplier: complex, part: int, pair: bool) -> co
 
     other = _conj(v) if pair else v
     first = linear.form(v, other)
-    if alike and abs(fraction(first)) > NOTHING * np.abs(first).max():
+    if alike and abs(fraction(first)) > ZERO_TOLERANCE * np.abs(first).max():
         raise NoOrbit('a branch crosses this one (transcritical)')
     a = complex(np.linalg.solve(weights, linear.fractions(1.0, first))[0])
     mixed = linear.solve(first - a * linear.moved(along), 1.0)
@@ -273,6 +273,6 @@ def _cubic(linear: Linearised, multiplier: complex, part: int, pair: bool) -> co
     slope = equation.derivative(v, factor)
     terms += [-a * linear.moved(slope), -a * linear.form(v, linear.late(along))]
     components = [fraction(term) for term in terms]
-    if abs(sum(components).real) <= NOTHING * max(map(abs, components)):
+    if abs(sum(components).real) <= ZERO_TOLERANCE * max(map(abs, components)):
         raise NoOrbit('its cubic term is 0')
     return complex(sum(components))

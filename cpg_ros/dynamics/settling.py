@@ -31,20 +31,20 @@ from cpg_ros.networks.network import Network
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 
-#: SPAN: duration of a simulation, model time; KEPT_FRACTION: time between recorded states.
-SPAN, KEPT_FRACTION = 500.0, 0.1
+#: Of a simulation, model time.
+DURATION, SAMPLE_PERIOD = 500.0, 0.1
 #: Step over the network's real-time step; more exact than adaptive methods with their usual
 #: tolerances (benchmarks/bench_optimize.py).
-COARSE_STEPS = 2.5
+STEP_RATIO = 2.5
 #: Standard deviation of the start's disturbance, which breaks all symmetry.
 DISTURBANCE = 0.05
-#: AVERAGED: number of cycles that are averaged; POINTS: points of a cycle.
-AVERAGED, POINTS = 3, 256
-#: ALIVE: range of the first variable below which nothing oscillates.
-ALIVE = 0.05
-#: Distance of a state from its return, over the range of the states; EXACTLY: of a return after
+#: Number of cycles that are averaged; points of a cycle.
+NUM_CYCLES, POINTS = 3, 256
+#: Range of the first variable below which nothing oscillates.
+MIN_RANGE = 0.05
+#: Distance of a state from its return, over the range of the states; that of a return after
 #: several cycles, over that after one, where the cycles differ.
-RETURNED, EXACTLY = 0.1, 0.01
+RETURN_TOLERANCE, MULTIPLE_CYCLE_RATIO = 0.1, 0.01
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -98,12 +98,12 @@ def start_states(networks: Sequence[Network], gait: str, seed: int) -> np.ndarra
 
 def population_run(networks: Sequence[Network], starts: np.ndarray) -> Trajectory:
     """Simulate networks from one start each, in one batch on all cores."""
-    step = COARSE_STEPS * networks[0].step
-    return simulate(networks, starts, SPAN, step, every=max(1, round(KEPT_FRACTION / step)),
+    step = STEP_RATIO * networks[0].step
+    return simulate(networks, starts, DURATION, step, every=max(1, round(SAMPLE_PERIOD / step)),
                     progress=False, quiet=True)
 
 
-def last_cycle(run: Trajectory, cells: int, first: int | None = None, least: float = ALIVE
+def last_cycle(run: Trajectory, cells: int, first: int | None = None, least: float = MIN_RANGE
                ) -> LimitCycle | None:
     """Find a simulation's cycle; None if it rests, diverges or does not repeat.
 
@@ -137,16 +137,16 @@ def last_cycle(run: Trajectory, cells: int, first: int | None = None, least: flo
     size = np.ptp(run.x[half:], axis=0).reshape(-1, cells).max(axis=1).repeat(cells)
     states = states / np.where(size > 0.0, size, 1.0)
     gaps = np.abs(states[:-1] - states[-1]).max(axis=1)
-    if gaps.min() > RETURNED:
+    if gaps.min() > RETURN_TOLERANCE:
         return None
-    back = np.flatnonzero(gaps <= max(0.2 * RETURNED, 1.5 * gaps.min()))[-1]
-    if gaps[back] > REPEATING and gaps.min() < EXACTLY * gaps[back]:
+    back = np.flatnonzero(gaps <= max(0.2 * RETURN_TOLERANCE, 1.5 * gaps.min()))[-1]
+    if gaps[back] > CYCLE_TOLERANCE and gaps.min() < MULTIPLE_CYCLE_RATIO * gaps[back]:
         # Only every second cycle is the same after a period doubling.
-        back = np.flatnonzero(gaps <= max(EXACTLY * gaps[back], 1.5 * gaps.min()))[-1]
+        back = np.flatnonzero(gaps <= max(MULTIPLE_CYCLE_RATIO * gaps[back], 1.5 * gaps.min()))[-1]
     period = float(high[-1] - high[back])
     same = states[::back - len(gaps)]
     drift = float(np.abs(same - same[0]).max()) if len(same) > 2 else np.inf
-    cycles = min(AVERAGED, int(high[-1] / period))
+    cycles = min(NUM_CYCLES, int(high[-1] / period))
     times = high[-1] + period * (np.arange(cycles * POINTS) / POINTS - cycles)
     signals = run(times).reshape(cycles, POINTS, -1).mean(axis=0)
     # An orbit begins where cell 1 peaks. The crossings lie in the second half of the run, so two
@@ -155,29 +155,27 @@ def last_cycle(run: Trajectory, cells: int, first: int | None = None, least: flo
     return LimitCycle(run, float(begin), period, signals, drift)
 
 
-#: SETTLING: periods of a simulation that is locked to a gait; HOLD: gain of the lock, 1/model
-#: time.
-SETTLING, HOLD = 30, 1.0
-#: Starts of a gait without a known one. SIZES: of waves about the equilibrium; RANDOM: number of
-#: random states in the gait's class; SCATTER: their standard deviation; all over the size of a
-#: variable at the equilibrium if that is above 1.
-SIZES, RANDOM, SCATTER = (0.5, 0.1, 2.0), 12, 0.3
-#: LOOKED: numbers of steps after which starts are checked; LONGER: further ones, on request;
-#: COARSER: factor of the step without a delay; DELAYS: fewest delays before the first look;
-#: SLOWER: largest factor of the step that this needs.
-LOOKED, LONGER, COARSER = (3125, 6250, 12_500, 25_000), (50_000, 100_000), 2.0
-DELAYS, SLOWER = 8.0, 4.0
-#: RESTING: rates below which a network rests, over those at first; REPEATING: relative difference
-#: up to which cycles repeat.
-RESTING, REPEATING = 1e-9, 1e-3
+#: Of a simulation that is locked to a gait; gain in 1/model time.
+SETTLING_PERIODS, LOCK_GAIN = 30, 1.0
+#: Starts of a gait without a known one: waves about the equilibrium, and random states in the
+#: gait's class with this standard deviation; all over the size of a variable at the equilibrium
+#: if that is above 1.
+WAVE_SIZES, NUM_RANDOM, RANDOM_DEVIATION = (0.5, 0.1, 2.0), 12, 0.3
+#: Numbers of steps after which starts are checked, and further ones on request.
+CHECK_STEPS, LATE_CHECK_STEPS = (3125, 6250, 12_500, 25_000), (50_000, 100_000)
+#: Factor of the step without a delay; with one, delays before the first check, and the factor of
+#: the step that these may need.
+UNDELAYED_STEP_RATIO, MIN_DELAYS, MAX_STEP_RATIO = 2.0, 8.0, 4.0
+#: Rates below which a network rests, over those at first; relative difference up to which cycles
+#: repeat.
+REST_TOLERANCE, CYCLE_TOLERANCE = 1e-9, 1e-3
 #: Ratio of a network's natural unit to 1 from which starts take it.
-FAR = 30.0
+MIN_UNIT_RATIO = 30.0
 #: Range of the first variable, over that of the whole run, below which a locked network does not
 #: oscillate.
-SMALLEST = 1e-3
-#: KEPT: largest relative error of the gait's shifts; ADDED: error up to which a further symmetry
-#: is there.
-KEPT, ADDED = 0.05, 0.01
+MIN_RANGE_RATIO = 1e-3
+#: Relative error of the gait's shifts, and that up to which there is a further symmetry.
+SHIFT_TOLERANCE, SYMMETRY_TOLERANCE = 0.05, 0.01
 
 
 class _Past:
@@ -203,9 +201,9 @@ def settle(network: Network, symmetry: Symmetry, start: np.ndarray, period: floa
     Return None if the network comes to rest or does not repeat within three periods.
     """
     step = min(network.step, period / 400.0)
-    lock = HOLD, symmetry
+    lock = LOCK_GAIN, symmetry
     history: History = start
-    early = 0 if network.delay_parameter else SETTLING // 4
+    early = 0 if network.delay_parameter else SETTLING_PERIODS // 4
     if early:
         # Most states that reach no gait come to rest soon.
         run = simulate(network, start, early * period, step, lock=lock, progress=False,
@@ -213,7 +211,7 @@ def settle(network: Network, symmetry: Symmetry, start: np.ndarray, period: floa
         if _ends(run, run.t.size // 2, np.abs(run.slopes).max()):
             return None
         history = run.x[-1]
-    rest = SETTLING + 3 - early
+    rest = SETTLING_PERIODS + 3 - early
     run = simulate(network, history, rest * period, step, lock=lock, progress=False, quiet=True)
     return last_cycle(run, network.cells, int((rest - 3) * period / step), _smallest(run, network))
 
@@ -246,7 +244,8 @@ def _stiff_cycle(network: Network, symmetry: Symmetry, start: np.ndarray) -> Sti
     """Simulate a network without a delay in a gait's class, with any steps it needs."""
     # Import here, as it takes long to load.
     from scipy.integrate import solve_ivp
-    cell, span = Quotient(network, symmetry.classes), LONGER[-1] * COARSER * network.step
+    cell = Quotient(network, symmetry.classes)
+    span = LATE_CHECK_STEPS[-1] * UNDELAYED_STEP_RATIO * network.step
     with np.errstate(all='ignore'), warnings.catch_warnings():
         # LSODA warns where it gives up.
         warnings.simplefilter('ignore')
@@ -262,9 +261,9 @@ def _stiff_cycle(network: Network, symmetry: Symmetry, start: np.ndarray) -> Sti
     risen = np.flatnonzero(late[:-1] & (first[:-1] < middle) & (first[1:] >= middle))
     states = run.y[:, risen] / np.where(size > 0.0, size, 1.0)[:, None]
     gaps = np.abs(states[:, :-1] - states[:, -1:]).max(axis=0, initial=0.0)
-    if not gaps.size or gaps.min() > RETURNED:
+    if not gaps.size or gaps.min() > RETURN_TOLERANCE:
         return None
-    last = np.flatnonzero(gaps <= max(0.2 * RETURNED, 1.5 * gaps.min()))[-1]
+    last = np.flatnonzero(gaps <= max(0.2 * RETURN_TOLERANCE, 1.5 * gaps.min()))[-1]
     end, period = run.t[risen[-1]], run.t[risen[-1]] - run.t[risen[last]]
     cycle = (run.t >= end - 2.0 * period) & (run.t <= end - period)
     begin = run.t[cycle][run.y[0, cycle].argmax()]
@@ -275,21 +274,22 @@ def _stiff_cycle(network: Network, symmetry: Symmetry, start: np.ndarray) -> Sti
 
 def _smallest(run: Trajectory, network: Network) -> float:
     """Return the range of the first variable below which a run does not oscillate."""
-    return float(SMALLEST * np.ptp(run.x[:, :network.cells]))
+    return float(MIN_RANGE_RATIO * np.ptp(run.x[:, :network.cells]))
 
 
 def _ends(run: Trajectory, first: int, rates: float) -> bool:
     """Return whether the network rests after a step, compared with some rates, or has diverged."""
     return bool(not np.isfinite(run.x[-1]).all()
-                or np.abs(run.slopes[first:]).max() <= RESTING * rates)
+                or np.abs(run.slopes[first:]).max() <= REST_TOLERANCE * rates)
 
 
-def starts(network: Network, symmetry: Symmetry, random: int = RANDOM) -> np.ndarray:
+def starts(network: Network, symmetry: Symmetry, random: int = NUM_RANDOM) -> np.ndarray:
     """Start states for a gait: waves with its phases, then random states of its class."""
     variables = np.arange(network.variables)[:, None]
     angle = 2.0 * np.pi * symmetry.phases - 0.5 * np.pi * variables
-    waves = np.multiply.outer(SIZES, np.cos(angle).ravel())
-    scattered = SCATTER * np.random.default_rng(0).standard_normal((random, network.components))
+    waves = np.multiply.outer(WAVE_SIZES, np.cos(angle).ravel())
+    scattered = RANDOM_DEVIATION * np.random.default_rng(0).standard_normal(
+        (random, network.components))
     # Random states within the class, with the same standard deviation.
     inside = scattered[:, :len(symmetry.basis)] @ symmetry.basis
     inside *= np.sqrt(network.components / len(symmetry.basis))
@@ -311,10 +311,10 @@ def natural_unit(network: Network, rest: np.ndarray) -> float | None:
              for order, terms in enumerate(higher, 1) for (v, *_, last), value in terms.items()
              if np.all(value) and np.all(linear.get((v, last), 0.0))]
     unit = min(sizes, default=1.0)
-    return None if 1.0 / FAR < unit < FAR else unit
+    return None if 1.0 / MIN_UNIT_RATIO < unit < MIN_UNIT_RATIO else unit
 
 
-def find_orbit(network: Network, gait: str, random: int = RANDOM,
+def find_orbit(network: Network, gait: str, random: int = NUM_RANDOM,
                longer: Callable[[], bool] = lambda: True
                ) -> Iterator[tuple[Symmetry, Path, float]]:
     """Yield the cycles of a gait on which the network settles in the gait's class.
@@ -336,20 +336,21 @@ def find_orbit(network: Network, gait: str, random: int = RANDOM,
     """
     directions = waves_of(network, gait)
     symmetry = directions[0]
-    step = network.step * (1.0 if network.delay_parameter else COARSER)
+    step = network.step * (1.0 if network.delay_parameter else UNDELAYED_STEP_RATIO)
     # Within the first steps there are a few periods, which a delay may make long.
-    slow = max(1.0, DELAYS * network.delay / (LOOKED[0] * step))
-    step *= min(slow, SLOWER)
-    longest = math.ceil(slow / SLOWER)
-    for group in np.array_split(starts(network, symmetry, random), (len(SIZES) + random) // LANES):
+    slow = max(1.0, MIN_DELAYS * network.delay / (CHECK_STEPS[0] * step))
+    step *= min(slow, MAX_STEP_RATIO)
+    longest = math.ceil(slow / MAX_STEP_RATIO)
+    for group in np.array_split(starts(network, symmetry, random),
+                                (len(WAVE_SIZES) + random) // LANES):
         histories: list[History] = list(group)
         before, rates = 0, 0.0
-        for steps in (longest * count for count in LOOKED + LONGER):
-            last = longest * LOOKED[-1]
+        for steps in (longest * count for count in CHECK_STEPS + LATE_CHECK_STEPS):
+            last = longest * CHECK_STEPS[-1]
             if not histories or (before == last and not longer()):
                 break
             batch = simulate(network, histories, (steps - before) * step, step,
-                             lock=(HOLD, symmetry), progress=False, quiet=True)
+                             lock=(LOCK_GAIN, symmetry), progress=False, quiet=True)
             if not (before or np.isfinite(batch.x[:, -1]).any()):
                 stiff = None if network.delay_parameter else _stiff_cycle(network, symmetry,
                                                                           group[0])
@@ -367,7 +368,7 @@ def find_orbit(network: Network, gait: str, random: int = RANDOM,
                 first = steps * 3 // 4 - before
                 cycle = last_cycle(run, network.cells, first, _smallest(run, network))
                 settled = _ends(run, first, rates) or (cycle is not None
-                                                       and cycle.drift <= REPEATING)
+                                                       and cycle.drift <= CYCLE_TOLERANCE)
                 if not settled:
                     histories.append(_Past(run))
                 if (settled or steps >= last) and cycle is not None:
@@ -381,4 +382,5 @@ def _fits(path: Path, symmetry: Symmetry) -> bool:
     count = 24 * symmetry.order
     x = path(np.arange(count) / count)[:, :symmetry.group.cells]
     gap = np.abs(x[:, symmetry.permutation] - np.roll(x, -24, axis=0)).max()
-    return bool(gap < KEPT * np.ptp(x)) and not signal_symmetry(symmetry, x, ADDED)
+    return bool(gap < SHIFT_TOLERANCE * np.ptp(x)) and not signal_symmetry(
+        symmetry, x, SYMMETRY_TOLERANCE)

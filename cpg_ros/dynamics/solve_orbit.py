@@ -37,16 +37,16 @@ from cpg_ros.dynamics.floquet import Multipliers, multipliers_within
 from cpg_ros.dynamics.hopf import first_hopf, hopf_points, HopfPoint
 from cpg_ros.dynamics.orbit import check_values, extra_symmetry, Orbit, Path
 from cpg_ros.dynamics.orbit_method import orbit_method
-from cpg_ros.dynamics.settling import find_orbit, RANDOM, SIZES
+from cpg_ros.dynamics.settling import find_orbit, NUM_RANDOM, WAVE_SIZES
 from cpg_ros.networks.equations import equations_of
 from cpg_ros.networks.network import Network, ParameterLine, Preset
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 
 #: Largest delay at which Hopf points are searched, over the network's delay.
-FURTHEST = 4.0
-#: POINTS: most points of a branch; MOST_PERIODS: most whole periods that are added to a delay.
-POINTS, MOST_PERIODS = 120, 12
+MAX_DELAY_RATIO = 4.0
+#: Points of a branch; whole periods that are added to a delay.
+MAX_POINTS, MAX_PERIODS = 120, 12
 
 
 def branch_orbits(network: Network, gait: str
@@ -79,7 +79,8 @@ def branch_orbits(network: Network, gait: str
 def _line(network: Network) -> tuple[ParameterLine, float, float]:
     """Return the line of parameters along which branches run, and its ends."""
     if network.delay_parameter:
-        return ParameterLine((network.delay_parameter,), (1.0,)), 0.0, FURTHEST * network.delay
+        return (ParameterLine((network.delay_parameter,), (1.0,)), 0.0,
+                MAX_DELAY_RATIO * network.delay)
     line = ParameterLine.parse(network.line, type(network))
     if line.at(network, line.value(network)) != network:
         line = ParameterLine(line.names[:1], (1.0,))
@@ -101,14 +102,14 @@ def _branch(network: Network, point: HopfPoint, low: float, high: float) -> Bran
             return None
         low, high = 0.5 * min(point.value, value), max(value, 1.1 * point.value)
     try:
-        return continue_from_hopf(point, line, low, high, most=POINTS)
+        return continue_from_hopf(point, line, low, high, most=MAX_POINTS)
     except NoOrbit:
         return None
 
 
 def _on_branch(network: Network, branch: Branch) -> Iterator[Orbit]:
     """Yield the orbits at the network's parameters on a branch."""
-    for periods in range(MOST_PERIODS + 1 if _repeats(network) else 1):
+    for periods in range(MAX_PERIODS + 1 if _repeats(network) else 1):
         yield from _crossings(network, branch, branch.along.value(network), periods)
 
 
@@ -221,22 +222,20 @@ def solve_from_path(network: Network, symmetry: Symmetry,
 
 #: Work on a gait's branches after which no further one is followed: sum over their points of the
 #: cube of their numbers, about a minute of CPU time.
-WORK = 2e11
-#: MORE_RANDOM: number of random states from which a thorough search simulates.
-MORE_RANDOM = 37
-#: Relative differences up to which two orbits are the same, up to phase and the network's
-#: symmetry.
-#: SAME_PERIOD: of the periods; SAME_LEVEL: of the ranges.
-SAME_PERIOD, SAME_LEVEL = 1e-6, 1e-4
-#: Relative differences up to which a simulation's cycle is a known orbit. NEAR_PERIOD: of the
-#: periods; NEAR_WAVEFORM: of the waveforms.
-NEAR_PERIOD, NEAR_WAVEFORM = 5e-3, 0.02
+MAX_WORK = 2e11
+#: Random states from which a thorough search simulates.
+NUM_RANDOM_THOROUGH = 37
+#: Relative differences of periods and ranges up to which two orbits are the same, up to phase and
+#: the network's symmetry.
+PERIOD_TOLERANCE, LEVEL_TOLERANCE = 1e-6, 1e-4
+#: Relative differences of periods and waveforms up to which a simulation's cycle is a known orbit.
+CYCLE_PERIOD_TOLERANCE, WAVEFORM_TOLERANCE = 5e-3, 0.02
 #: Starts of the deflated method: factors of an orbit's size about its mean, and of its period.
-SCALED = ((0.5, 1.0), (1.5, 1.0), (0.8, 0.8), (1.2, 1.3))
-#: Orbits of a gait, at most.
-MOST = 24
-#: COMPARED: points of a cycle at which waveforms are compared.
-COMPARED = 120
+START_SCALES = ((0.5, 1.0), (1.5, 1.0), (0.8, 0.8), (1.2, 1.3))
+#: Of a gait.
+MAX_ORBITS = 24
+#: Of a cycle, at which waveforms are compared.
+POINTS = 120
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -302,7 +301,7 @@ def coexisting_orbits(network: Network, gait: str, near: Orbit | None = None, *,
     search = _Search(network, gait)
     why = search.reach(near)
     if everything or (not search.starts and (starts or not search.attracting)):
-        search.simulate(MORE_RANDOM if everything else RANDOM, everything)
+        search.simulate(NUM_RANDOM_THOROUGH if everything else NUM_RANDOM, everything)
     if everything or not search.attracting:
         # Without a delay branches take longer than anything else.
         if everything or network.delay_parameter:
@@ -332,7 +331,7 @@ class _Search:
         except NoOrbit as error:
             if not self.network.delay_parameter:
                 # The solver has simulated from these starts.
-                self.starts = len(SIZES) + RANDOM
+                self.starts = len(WAVE_SIZES) + NUM_RANDOM
             return str(error)
         return ''
 
@@ -366,13 +365,13 @@ class _Search:
         try:
             for symmetry, path, period in find_orbit(self.network, self.gait, random,
                                                      lambda: longer or not self.attracting):
-                if len(self.orbits) < MOST and not any(
+                if len(self.orbits) < MAX_ORBITS and not any(
                         _near(path, period, orbit) for orbit in self.orbits):
                     self.add(solve_from_path(self.network, symmetry, path, period))
         except (NoEquilibrium, NoOrbit):
             # The starts lie about the equilibrium, or all run away.
             return
-        self.starts = len(SIZES) + random
+        self.starts = len(WAVE_SIZES) + random
 
     def follow_branches(self) -> None:
         """Follow the branches of the class's Hopf points to the parameters."""
@@ -380,11 +379,11 @@ class _Search:
         for branch, orbits in branch_orbits(self.network, self.gait):
             self.hopf_points += 1
             for orbit in orbits:
-                if len(self.orbits) < MOST:
+                if len(self.orbits) < MAX_ORBITS:
                     self.add(orbit)
             if branch is not None:
                 work += sum(point.curve_point.z.size**3.0 for point in branch.points)
-            if self.network.delay_parameter and work > WORK:
+            if self.network.delay_parameter and work > MAX_WORK:
                 self.unfollowed = True
                 break
 
@@ -397,14 +396,14 @@ class _Search:
             for path, period in _scaled(orbit):
                 solution = solve_from_path(self.network, orbit.symmetry, path, period,
                                            [other.period for other in self.orbits])
-                if len(self.orbits) < MOST and self.add(solution):
+                if len(self.orbits) < MAX_ORBITS and self.add(solution):
                     todo.append(self.orbits[-1])
 
 
 def _scaled(orbit: Orbit) -> Iterator[tuple[Path, float]]:
     """Yield guesses about an orbit, states over times in cycles, and their periods."""
-    mean = orbit.cycle(COMPARED).mean(axis=0)
-    for size, slower in SCALED:
+    mean = orbit.cycle(POINTS).mean(axis=0)
+    for size, slower in START_SCALES:
         def path(theta: np.ndarray, size: float = size) -> np.ndarray:
             return mean + size * (orbit(theta * orbit.period) - mean)
 
@@ -419,18 +418,18 @@ def _levels(orbit: Orbit) -> np.ndarray:
 
 def _same(orbit: Orbit, other: Orbit) -> bool:
     if (orbit.symmetry != other.symmetry
-            or abs(orbit.period / other.period - 1.0) > SAME_PERIOD):
+            or abs(orbit.period / other.period - 1.0) > PERIOD_TOLERANCE):
         return False
     a, b = _levels(orbit), _levels(other)
-    return bool(np.abs(a - b).max() < SAME_LEVEL * np.abs(a).max())
+    return bool(np.abs(a - b).max() < LEVEL_TOLERANCE * np.abs(a).max())
 
 
 def _near(path: Path, period: float, orbit: Orbit) -> bool:
     """Return whether the cycle of a simulation is an orbit that is known."""
-    if abs(period / orbit.period - 1.0) > NEAR_PERIOD:
+    if abs(period / orbit.period - 1.0) > CYCLE_PERIOD_TOLERANCE:
         return False
-    exact, states = orbit.cycle(COMPARED), path(np.arange(COMPARED) / COMPARED)
-    return bool(np.abs(states - exact).max() < NEAR_WAVEFORM * np.ptp(exact))
+    exact, states = orbit.cycle(POINTS), path(np.arange(POINTS) / POINTS)
+    return bool(np.abs(states - exact).max() < WAVEFORM_TOLERANCE * np.ptp(exact))
 
 
 def _below_threshold(network: Network, gait: str) -> str:

@@ -34,12 +34,12 @@ from cpg_ros.networks.network import Network
 
 #: Rate at which transverse disturbances decay with the lock gain, 1/model time. With a delay they
 #: decay by 1/e within it at most: the gain grows exponentially with their product.
-RATE = 0.5
+MAX_LOCK_RATE = 0.5
 
 
 def lock_rate(network: Network) -> float:
     """Return the rate at which transverse disturbances decay with the lock, 1/model time."""
-    return min(RATE, 1.0 / network.delay) if network.delay else RATE
+    return min(MAX_LOCK_RATE, 1.0 / network.delay) if network.delay else MAX_LOCK_RATE
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ def stability(orbit: Orbit) -> Stability:
                'stride',
         None: 'cannot tell whether a disturbance within its own symmetry class decays: its '
               f'multiplier is {inside.leading:.10g}, with an error of '
-              f'{max(inside.error, 1.0 - floquet.ATTRACTS):.0e}'}
+              f'{max(inside.error, 1.0 - floquet.MAX_STABLE_MODULUS):.0e}'}
     return Stability(enough, gain, reason[inside.attracts])
 
 

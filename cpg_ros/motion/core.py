@@ -24,7 +24,7 @@ from functools import cache
 from typing import Any
 
 from cpg_ros.common.c_library import load
-from cpg_ros.dynamics.integration.c_kernel import lanes_of, library_of, ONE, version
+from cpg_ros.dynamics.integration.c_kernel import lanes_of, library_of, ONE_LANE, version
 from cpg_ros.dynamics.integration.c_text import part
 from cpg_ros.dynamics.integration.stepper import Stepper
 from cpg_ros.dynamics.mesh.collocation import solver
@@ -131,7 +131,7 @@ def precompile(name: str) -> None:
     # A gait without a stored orbit is sought from an equilibrium, by higher derivatives.
     generated.equations_of(network).derive(higher=network in NETWORKS.files)
     library_of(network)
-    lanes_of(network, ONE)
+    lanes_of(network, ONE_LANE)
     if not network.delay_parameter:
         solver()
 

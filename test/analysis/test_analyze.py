@@ -147,7 +147,7 @@ def test_gaits_that_are_born_unstable_are_found_and_judged(capsys):
 
 def test_multipliers_that_are_unsure_are_said_to_be(capsys, monkeypatch):
     # One polynomial for a delay of two periods is far too coarse.
-    monkeypatch.setattr('cpg_ros.dynamics.fourier.floquet.SPAN', 100.0)
+    monkeypatch.setattr('cpg_ros.dynamics.fourier.floquet.MAX_ELEMENT_LENGTH', 100.0)
     monkeypatch.setattr(multipliers, '__defaults__', (0.0, EXACT._replace(halvings=1)))
     assert main(['--network', 'delayed', '--set', 'tau=3']) == 0
     assert 'instead of 1; the others are no better' in capsys.readouterr().out
@@ -198,7 +198,7 @@ def test_a_biped_set_with_weights_of_its_own(capsys):
 def test_hopf_points_of_linear_rates_have_no_normal_form(capsys, monkeypatch):
     """Matsuoka's neurons: orbits are born with the size at which a potential reaches 0."""
     monkeypatch.setattr('cpg_ros.analysis.analyze.verdicts', lambda *arguments: {})
-    monkeypatch.setattr('cpg_ros.dynamics.hopf.GRID', 25)
+    monkeypatch.setattr('cpg_ros.dynamics.hopf.GRID_SIZE', 25)
     args = ('--network', 'matsuoka', '--range', '0.5:1.2')
     (point,) = as_json(capsys, *args)['hopf']
     # 1 + tau/tau_v, less the three weights of 0.05 in phase and out of phase alike, twice.

@@ -275,7 +275,7 @@ def test_a_crossing_beside_a_gap_between_points_of_the_grid_is_found(zero, found
 
 
 def test_refusals(monkeypatch):
-    monkeypatch.setattr(hopf, 'GRID', 5)
+    monkeypatch.setattr(hopf, 'GRID_SIZE', 5)
     along = ParameterLine.parse('gamma=delta', Quadruped)
     with pytest.raises(ValueError, match='low 1 must be less than high 0'):
         hopf_points(PACE, along, 1, 0)

@@ -340,7 +340,7 @@ def test_a_branch_ends_where_its_period_has_grown():
 
 
 def test_a_waveform_too_steep_ends_the_branch(monkeypatch):
-    monkeypatch.setattr(solve, 'MOST_NODES', 255)
+    monkeypatch.setattr(solve, 'MAX_NODES', 255)
     (network, mode, _, _), (omega, tau, _, _) = SUBCRITICAL['pace'], hopf(*SUBCRITICAL['pace'])
     branch = continue_from_hopf(hopf_point(network, mode, omega, tau), TAU, 0.5, 5.0)
     assert branch.ends[1].why == 'steep' and branch.points[-1].orbit.values.size == 255

@@ -21,7 +21,7 @@ from cpg_ros.dynamics.floquet import Multipliers, multipliers, smallest_gain, st
 from cpg_ros.dynamics.integration.simulate import simulate
 from cpg_ros.dynamics.mesh.floquet import eigenvalues
 from cpg_ros.dynamics.solve_orbit import solve_preset
-from cpg_ros.dynamics.stability import RATE, stability
+from cpg_ros.dynamics.stability import MAX_LOCK_RATE, stability
 from cpg_ros.motion.phase_readout import PhaseReadout
 from cpg_ros.networks.library.biped import Biped
 from cpg_ros.networks.library.quadruped import Quadruped
@@ -129,7 +129,7 @@ def test_shipped_gaits_attract(network, name):
     # The gain chosen lets what is transverse decay by RATE at least, and none is spent beyond.
     gain = judged.lock_gain
     slowest = np.log(max(np.abs(mine.transverse), default=1e-300)) / orbit.period - gain
-    assert slowest <= -RATE + 1e-9 and (gain == 0.0 or slowest >= -RATE - 1e-9)
+    assert slowest <= -MAX_LOCK_RATE + 1e-9 and (gain == 0.0 or slowest >= -MAX_LOCK_RATE - 1e-9)
     enough = smallest_gain(orbit)
     assert judged.enough == enough <= judged.lock_gain
     assert np.abs(mine.transverse).max(initial=0.0) <= np.exp(enough * orbit.period) + 1e-9

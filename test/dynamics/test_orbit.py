@@ -206,8 +206,8 @@ def test_the_error_of_a_coarse_orbit_is_that_against_a_fine_one(case, monkeypatc
     exact = solve_preset(ALL_PRESETS[case]['trot'])
     assert exact.error < 1e-10
     # As if waveforms were resolved with far larger last terms.
-    monkeypatch.setattr(mesh_orbit, 'RESOLVED', 1e-5)
-    monkeypatch.setattr(fourier_solve, 'RESOLVED', 1e-3)
+    monkeypatch.setattr(mesh_orbit, 'INTERVAL_TOLERANCE', 1e-5)
+    monkeypatch.setattr(fourier_solve, 'HARMONIC_TOLERANCE', 1e-3)
     theta = np.arange(499) / 499
     coarse = solve_from_path(exact.network, exact.symmetry,
                              lambda at: exact(at * exact.period), exact.period)

@@ -163,7 +163,7 @@ def test_batches_single_runs_and_some_of_their_rows_agree(kind, batch, monkeypat
     sets = [kind(*numbers(WALK[kind]) * rng.uniform(0.8, 1.2)) for _ in starts]
     single = [simulate(*pair, 10.0, 0.02).x for pair in zip(sets, starts, strict=True)]
     for chunk in (50_000, 10**7):
-        monkeypatch.setattr('cpg_ros.dynamics.integration.simulate.CHUNK', chunk)
+        monkeypatch.setattr('cpg_ros.dynamics.integration.simulate.CHUNK_WORK', chunk)
         run, few = (simulate(sets, starts, 9.94, 0.02, every=every) for every in (1, 7))
         assert np.allclose(run.x, np.array(single)[:, :498], 0.0, 1e-12)
         assert np.array_equal([few.x, few.slopes], [run.x[:, ::7], run.slopes[:, ::7]])

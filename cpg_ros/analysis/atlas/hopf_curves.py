@@ -36,7 +36,13 @@ from cpg_ros.common.errors import CpgError, ShortRepr
 from cpg_ros.dynamics import arclength
 from cpg_ros.dynamics.characteristic import characteristic_matrix
 from cpg_ros.dynamics.equilibrium import equilibrium, odd, Quotient
-from cpg_ros.dynamics.hopf import hopf_points, HopfPoint, ON_AXIS, SPARE, tracked_roots
+from cpg_ros.dynamics.hopf import (
+    AXIS_TOLERANCE,
+    hopf_points,
+    HopfPoint,
+    NUM_EXTRA_ROOTS,
+    tracked_roots,
+)
 from cpg_ros.dynamics.isotypic import Block, block_at, block_of, blocks, classes, Expansion
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
@@ -497,10 +503,10 @@ def _bautin(curve: _Curve, gait: str) -> Iterator[CodimensionTwo]:
 def _other_roots(curve: _Curve, gait: str) -> list[CodimensionTwo]:
     """Return where other roots of any class cross: pairs, or a real one."""
     crossings: list[CodimensionTwo] = []
-    small = ON_AXIS * float(curve.fractions[:, 2].max())
+    small = AXIS_TOLERANCE * float(curve.fractions[:, 2].max())
     points = [curve.at(fraction) for fraction in curve.fractions]
     for which in range(len(points[0][1])):
-        count = tracked_roots([split[which] for _, split in points], SPARE + 2)
+        count = tracked_roots([split[which] for _, split in points], NUM_EXTRA_ROOTS + 2)
 
         def others(fraction: np.ndarray, which: int = which, count: int = count) -> np.ndarray:
             point, split = curve.at(fraction)

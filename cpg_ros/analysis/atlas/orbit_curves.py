@@ -29,8 +29,8 @@ from cpg_ros.analysis.atlas.grid import GaitMap, NONE, solve_from_wave
 from cpg_ros.analysis.atlas.hopf_curves import Boundary
 from cpg_ros.common.errors import CpgError, ShortRepr
 from cpg_ros.dynamics import arclength
-from cpg_ros.dynamics.continuation import kind_of, REAL
-from cpg_ros.dynamics.floquet import ATTRACTS, multipliers
+from cpg_ros.dynamics.continuation import IMAGINARY_TOLERANCE, kind_of
+from cpg_ros.dynamics.floquet import MAX_STABLE_MODULUS, multipliers
 from cpg_ros.dynamics.fourier.floquet import Accuracy
 from cpg_ros.dynamics.orbit import Orbit
 from cpg_ros.dynamics.orbit_normal_form import loses_stability, orbit_normal_form
@@ -147,7 +147,7 @@ def _candidates(plane: OrbitPlane, part: int, rank: int, fractions: Sequence[np.
         except (CpgError, IndexError):
             break
     for (start, left, orbit), (end, right, _) in pairwise(along):
-        complexes = [abs(mu.imag) > REAL for mu in (left, right)]
+        complexes = [abs(mu.imag) > IMAGINARY_TOLERANCE for mu in (left, right)]
         for n in (3, 4):
             gaps = [2.0 * mu.real - SUMS[n] for mu in (left, right)]
             if all(complexes) and gaps[0] * gaps[1] <= 0.0 and gaps[0] != gaps[1]:
@@ -156,7 +156,7 @@ def _candidates(plane: OrbitPlane, part: int, rank: int, fractions: Sequence[np.
             # The pair has met on the real axis, where the curve of torus points ends.
             yield start, 1 if right.real > 0.0 else 2, orbit
             return
-    if along and abs(along[-1][1].imag) > REAL:
+    if along and abs(along[-1][1].imag) > IMAGINARY_TOLERANCE:
         last, mu, orbit = along[-1]
         for n in (1, 2):
             if abs(2.0 * mu.real - SUMS[n]) < CLOSE:
@@ -172,10 +172,10 @@ def _solved(plane: OrbitPlane, part: int, n: int, fraction: np.ndarray
         plane.last = plane.orbit(fraction)
         roots = spectrum(plane.last)[part]
         root = complex(roots[np.abs(roots - target).argmin()])
-        if abs(root.imag) > REAL * REAL:
+        if abs(root.imag) > IMAGINARY_TOLERANCE * IMAGINARY_TOLERANCE:
             product, total = abs(root)**2, 2.0 * root.real
         else:
-            real = roots[np.abs(roots.imag) <= REAL * REAL].real
+            real = roots[np.abs(roots.imag) <= IMAGINARY_TOLERANCE * IMAGINARY_TOLERANCE].real
             pair = real[np.abs(real - target.real).argsort()[:2]]
             product, total = float(pair.prod()), float(pair.sum())
         return np.array([product - 1.0, total - SUMS[n]])
@@ -240,7 +240,7 @@ def _through(chart: ParameterPlane, gait: str, edge: Edge) -> Iterator[Boundary]
     plane.last = solve_from_wave(chart.at_fractions(edge.start), gait, edge.wave, edge.period)
     before, after = spectrum(plane.last), spectrum(plane.orbit(edge.end))
     for part, ends in enumerate(zip(before, after, strict=True)):
-        counts = [int((np.abs(roots) >= ATTRACTS).sum()) for roots in ends]
+        counts = [int((np.abs(roots) >= MAX_STABLE_MODULUS).sum()) for roots in ends]
         if counts[0] == counts[1]:
             continue
         rank = min(counts)

@@ -29,7 +29,7 @@ from typing import NamedTuple
 from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.dynamics.characteristic import chebyshev
 from cpg_ros.dynamics.fourier import orbit as collocation
-from cpg_ros.dynamics.fourier.orbit import equations, FourierOrbit, MOST_NODES, rows_of
+from cpg_ros.dynamics.fourier.orbit import equations, FourierOrbit, MAX_NODES, rows_of
 from cpg_ros.dynamics.isotypic import split
 from cpg_ros.dynamics.orbit import NOT_ISOLATED, Waveforms
 from cpg_ros.networks.equations import Field, States
@@ -37,7 +37,7 @@ import numpy as np
 import scipy
 
 #: Size of the last harmonics at which the adjoint is resolved.
-RESOLVED = 1e-9
+HARMONIC_TOLERANCE = 1e-9
 
 
 def adjoint(orbit: FourierOrbit) -> Waveforms:
@@ -61,9 +61,9 @@ def adjoint(orbit: FourierOrbit) -> Waveforms:
             raise NoOrbit(NOT_ISOLATED) from error
         # A rate p added to one wave at all times changes 1/T by the mean of z p over its cells.
         values = -n * by_residual / (alike * orbit.period**2)
-        if max(collocation.tail(row) for row in values) <= RESOLVED:
+        if max(collocation.tail(row) for row in values) <= HARMONIC_TOLERANCE:
             break
-        if n >= 2 * MOST_NODES:
+        if n >= 2 * MAX_NODES:
             raise NoOrbit(f'the phase response is too steep for {n} nodes')
         u = np.array([collocation.resample(row, 2 * n + 1) for row in u])
     variables = orbit.network.variables
@@ -74,10 +74,10 @@ def adjoint(orbit: FourierOrbit) -> Waveforms:
     return waveform
 
 
-#: DEGREE: polynomial degree on an element; SPAN: largest length of an element, in periods.
-DEGREE, SPAN = 20, 0.4
+#: Polynomial degree on an element; length of an element, in periods.
+DEGREE, MAX_ELEMENT_LENGTH = 20, 0.4
 #: Size of a matrix up to which all eigenvalues take no longer than the largest.
-FEW = 90
+MAX_DENSE_SIZE = 90
 
 
 POINTS, DERIVATIVE, _WEIGHTS = chebyshev(DEGREE)
@@ -193,7 +193,7 @@ class Variation:
 
         """
         size, later = self.period_map(columns, gain)
-        if count is not None and size > FEW:
+        if count is not None and size > MAX_DENSE_SIZE:
             arpack = scipy.sparse.linalg
             operator = arpack.LinearOperator((size, size),
                                              matvec=lambda x: later(x.reshape(-1, 1))[:, 0])
@@ -252,7 +252,7 @@ def largest_transverse(orbit: FourierOrbit, gain: float = 0.0, exact: float = 1e
 @lru_cache(maxsize=4)
 def variation(orbit: FourierOrbit, accuracy: Accuracy = EXACT) -> tuple[Variation, np.ndarray]:
     """Return a sufficiently fine variational equation and the multipliers within the class."""
-    n = max(1, int(np.ceil(orbit.network.delay / (SPAN * orbit.period))))
+    n = max(1, int(np.ceil(orbit.network.delay / (MAX_ELEMENT_LENGTH * orbit.period))))
     for halving in range(accuracy.halvings):
         equation = Variation(orbit, n * 2**halving)
         roots = equation.multipliers(equation.inside, 0.0, accuracy.leading, accuracy.exact)
@@ -298,8 +298,8 @@ def mode(orbit: FourierOrbit, part: int, multiplier: complex
     return path
 
 
-#: MOST: largest number of unknowns, as the matrices are dense.
-MOST = 4096
+#: The matrices are dense.
+MAX_UNKNOWNS = 4096
 
 
 class Variational:
@@ -326,7 +326,7 @@ class Variational:
         """
         network = orbit.network
         n = (orbit.samples + 1) * 2**halvings - 1
-        if n > 2 * MOST_NODES + 1 or n * network.components > MOST:
+        if n > 2 * MAX_NODES + 1 or n * network.components > MAX_UNKNOWNS:
             raise NoOrbit('the waveform is too steep')
         self._orbit, self._n, self.delay = orbit, n, network.delay
         self._times = np.arange(n) / n * orbit.period

@@ -207,7 +207,7 @@ class FourierOrbit(Orbit):
     @property
     def samples(self) -> int:
         """Number of evenly spaced points that resolve a waveform: the nodes, if they are even."""
-        return int(self.values.shape[-1]) if isinstance(self.basis, Nodes) else MOST_NODES
+        return int(self.values.shape[-1]) if isinstance(self.basis, Nodes) else MAX_NODES
 
     @property
     def between(self) -> np.ndarray:
@@ -242,17 +242,16 @@ class FourierOrbit(Orbit):
         return super()._states(times, order)
 
 
-NODES = 63
-MOST_NODES = 511
-#: STEPS: most steps of Newton's method.
-STEPS = 12
-#: RESOLVED: relative size of the last harmonics at which a waveform is resolved.
-RESOLVED = 1e-12
+NUM_NODES = 63
+MAX_NODES = 511
+NEWTON_ITERATIONS = 12
+#: Relative size of the last harmonics at which a waveform is resolved.
+HARMONIC_TOLERANCE = 1e-12
 #: States, parameters, derivative by the delay, and slopes in theta; see ``equations``.
 Point = tuple[list[np.ndarray], list[np.ndarray], np.ndarray, np.ndarray]
-#: Over the guess: SMALLEST: range below which Newton's method has reached the equilibrium;
-#: FURTHEST: size at which it has diverged.
-SMALLEST, FURTHEST = 1e-7, 1e3
+#: Over the guess: range below which Newton's method has reached the equilibrium, and size of the
+#: states at which it has diverged.
+MIN_RANGE_RATIO, MAX_STATE_RATIO = 1e-7, 1e3
 
 
 @lru_cache(maxsize=64)
@@ -377,8 +376,8 @@ class Converged(NamedTuple):
 def converge(network: Network, symmetry: Symmetry, u: np.ndarray, period: float, basis: Basis,
              periods: Sequence[float] = ()) -> Converged | None:
     """Solve on one basis by Newton's method; None where it diverges or reaches an equilibrium."""
-    range_at_first, furthest = np.ptp(u[0]), FURTHEST * np.abs(u).max()
-    for _ in range(2 * STEPS if periods else STEPS):
+    range_at_first, furthest = np.ptp(u[0]), MAX_STATE_RATIO * np.abs(u).max()
+    for _ in range(2 * NEWTON_ITERATIONS if periods else NEWTON_ITERATIONS):
         residual, jacobian, point = equations(network, symmetry, u, period, basis)
         size, rise = float(np.abs(residual[:-1]).max()), float(np.abs(point[3]).max()) / period
         if size <= basis.tolerance * rise or not rise:
@@ -395,5 +394,6 @@ def converge(network: Network, symmetry: Symmetry, u: np.ndarray, period: float,
             return None
     else:
         return None
-    return Converged(u, period, jacobian, point) if np.ptp(u[0]) > SMALLEST * range_at_first else (
+    return Converged(
+        u, period, jacobian, point) if np.ptp(u[0]) > MIN_RANGE_RATIO * range_at_first else (
         None)

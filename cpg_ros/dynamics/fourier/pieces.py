@@ -39,11 +39,11 @@ POINTS, _DERIVE, _WEIGHTS = chebyshev(S)
 _TAIL = np.linalg.inv(np.polynomial.chebyshev.chebvander(2.0 * POINTS - 1.0, S))[-2:]
 #: Waveforms, shape (rows, m), as a function of theta in cycles, shape (m,).
 Rows = Callable[[np.ndarray], np.ndarray]
-#: FIRST, MOST: first and largest number of intervals; LOOKED: points of a guess.
-FIRST, MOST, LOOKED = 40, 600, 8192
-#: RESOLVED: size of the last terms over the range at which an interval is resolved; PEAKED: by how
-#: much the start may miss cell 1's peak, over its range; ROUNDS: meshes at most.
-RESOLVED, PEAKED, ROUNDS = 1e-11, 1e-9, 12
+#: MIN_INTERVALS: of the first mesh; GUESS_POINTS: of a cycle, at which the guess is evaluated.
+MIN_INTERVALS, MAX_INTERVALS, GUESS_POINTS = 40, 600, 8192
+#: Over the range: size of the last terms at which an interval is resolved; by how much the start
+#: may miss cell 1's peak. MAX_ITERATIONS: number of meshes.
+INTERVAL_TOLERANCE, PEAK_TOLERANCE, MAX_ITERATIONS = 1e-11, 1e-9, 12
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -149,22 +149,22 @@ def solve(network: Network, symmetry: Symmetry, rows: Rows, period: float
         period: guess, model time.
 
     """
-    positions = np.linspace(0.0, 1.0, LOOKED + 1)
+    positions = np.linspace(0.0, 1.0, GUESS_POINTS + 1)
     values = rows(positions[:-1])
     bend = np.abs(np.roll(values, -1, 1) - 2.0 * values + np.roll(values, 1, 1))
     bend = (bend / np.ptp(values, axis=1)[:, None]).max(axis=0)
-    ends = spread(positions, np.sqrt(bend + 1e-6 * bend.max()), FIRST)
-    for _ in range(ROUNDS):
+    ends = spread(positions, np.sqrt(bend + 1e-6 * bend.max()), MIN_INTERVALS)
+    for _ in range(MAX_ITERATIONS):
         u = rows(nodes_of(ends, POINTS[:-1]))
         basis = Pieces(ends, u[0])
         solved = converge(network, symmetry, u, period, basis)
         if solved is None:
             return None
         start, left = _peak(basis, solved.u[0]), _left_out(solved.u)
-        if not start and left.max() <= RESOLVED:
+        if not start and left.max() <= INTERVAL_TOLERANCE:
             return complete(network, symmetry, *solved, basis)
         ends, period = _remeshed(ends, left, start), solved.period
-        if ends.size - 1 > MOST:
+        if ends.size - 1 > MAX_INTERVALS:
             return None
 
         def rows(theta: np.ndarray, old: Pieces = basis, u: np.ndarray = solved.u,
@@ -176,12 +176,13 @@ def solve(network: Network, symmetry: Symmetry, rows: Rows, period: float
 
 def _peak(basis: Pieces, values: np.ndarray) -> float:
     """Return theta of the largest value, or 0 if it is at the start."""
-    fine = basis.evaluate(values, np.arange(LOOKED) / LOOKED)
-    if fine.max() <= values[0] + PEAKED * np.ptp(fine):
+    fine = basis.evaluate(values, np.arange(GUESS_POINTS) / GUESS_POINTS)
+    if fine.max() <= values[0] + PEAK_TOLERANCE * np.ptp(fine):
         return 0.0
-    start = fine.argmax() / LOOKED
+    start = fine.argmax() / GUESS_POINTS
     slope, bend = (float(basis.evaluate(values, np.array([start]), order)[0]) for order in (1, 2))
-    return start + float(np.clip(-slope / bend, -1.0 / LOOKED, 1.0 / LOOKED)) if bend else start
+    return start + float(np.clip(-slope / bend, -1.0 / GUESS_POINTS, 1.0 / GUESS_POINTS)
+                         ) if bend else start
 
 
 def _left_out(u: np.ndarray) -> np.ndarray:
@@ -194,9 +195,9 @@ def _left_out(u: np.ndarray) -> np.ndarray:
 
 def _remeshed(ends: np.ndarray, left: np.ndarray, start: float) -> np.ndarray:
     """Return a mesh from another start that fits a solution."""
-    shares = (left / RESOLVED)**(1.0 / S)
+    shares = (left / INTERVAL_TOLERANCE)**(1.0 / S)
     turned = np.unique([0.0, *(ends[:-1] - start) % 1.0, 1.0])
     middles = (0.5 * (turned[:-1] + turned[1:]) + start) % 1.0
     k = np.clip(np.searchsorted(ends, middles) - 1, 0, left.size - 1)
-    n = left.size + (1 + left.size // 16 if left.max() > RESOLVED else 0)
+    n = left.size + (1 + left.size // 16 if left.max() > INTERVAL_TOLERANCE else 0)
     return spread(turned, (shares / np.diff(ends))[k], max(n, int(1.25 * shares.sum())))

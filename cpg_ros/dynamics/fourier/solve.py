@@ -31,10 +31,10 @@ from cpg_ros.dynamics.fourier.orbit import (
     converge,
     equations,
     FourierOrbit,
-    MOST_NODES,
-    NODES,
+    HARMONIC_TOLERANCE,
+    MAX_NODES,
     Nodes,
-    RESOLVED,
+    NUM_NODES,
     rows_of,
 )
 from cpg_ros.dynamics.hopf import first_hopf
@@ -105,11 +105,11 @@ class FourierCurve(ShortRepr):
         fine = collocation.resample(rows[0], 4 * n)
         start = (0.0 if fine.max() <= rows[0, 0] + 1e-9 * np.ptp(rows[0])
                  else fine.argmax() / (4 * n))
-        more = max(collocation.tail(row) for row in rows) > RESOLVED
+        more = max(collocation.tail(row) for row in rows) > HARMONIC_TOLERANCE
         if not more and not start:
             return None
-        if more and n >= MOST_NODES:
-            raise NoOrbit(f'the waveform is too steep for {MOST_NODES} nodes')
+        if more and n >= MAX_NODES:
+            raise NoOrbit(f'the waveform is too steep for {MAX_NODES} nodes')
         nodes = 2 * n + 1 if more else n
         theta = start + np.arange(nodes) / nodes
         moved = [np.concatenate([*(collocation.evaluate(row, theta) for row in self._rows(vector)),
@@ -147,7 +147,7 @@ def curve_beside(network: Network, symmetry: Symmetry, line: ParameterLine,
         period: of the new orbits, model time.
 
     """
-    theta = np.arange(NODES) / NODES
+    theta = np.arange(NUM_NODES) / NUM_NODES
     return (FourierCurve(network, symmetry, line, scales, sizes),
             np.append(rows_of(network, symmetry, path(theta)), [period, line.value(network)]),
             np.append(rows_of(network, symmetry, disturbance(theta)), [0.0, 0.0]))
@@ -173,9 +173,9 @@ def newton(network: Network, symmetry: Symmetry, u: np.ndarray, period: float,
         if solved is None:
             return None
         u, period = solved.u, solved.period
-        if max(collocation.tail(row) for row in u) <= RESOLVED:
+        if max(collocation.tail(row) for row in u) <= HARMONIC_TOLERANCE:
             return complete(network, symmetry, *solved)
-        if u.shape[1] >= MOST_NODES:
+        if u.shape[1] >= MAX_NODES:
             return _steep(network, symmetry, Nodes(u.shape[1]), u, period)
         u, periods = np.array([collocation.resample(row, 2 * row.size + 1) for row in u]), ()
 
@@ -191,14 +191,14 @@ def _steep(network: Network, symmetry: Symmetry, basis: Basis, u: np.ndarray, pe
     orbit = pieces.solve(network, symmetry, lambda theta: np.array(
         [basis.evaluate(row, theta, 0) for row in u]), period)
     if orbit is None:
-        raise NoOrbit(f'the waveform is too steep for {MOST_NODES} nodes and for '
-                      f'{pieces.MOST} intervals')
+        raise NoOrbit(f'the waveform is too steep for {MAX_NODES} nodes and for '
+                      f'{pieces.MAX_INTERVALS} intervals')
     return orbit
 
 
 #: Points of a cycle at which describing functions are computed.
 POINTS = 32
-THETA = np.arange(NODES) / NODES
+THETA = np.arange(NUM_NODES) / NUM_NODES
 
 
 def _delayed(network: Network, delay: float) -> Network:
@@ -206,7 +206,7 @@ def _delayed(network: Network, delay: float) -> Network:
 
 
 #: By how much the start may miss cell 1's peak, over its range.
-PEAKED = 1e-8
+PEAK_TOLERANCE = 1e-8
 Describing = Callable[[float], tuple[complex, complex]]
 
 
@@ -280,7 +280,7 @@ def _accepted(orbit: FourierOrbit | None) -> FourierOrbit | None:
     if orbit is None:
         return None
     first = orbit.values[0, 0]
-    return orbit if first[0] >= first.max() - PEAKED * np.ptp(first) else None
+    return orbit if first[0] >= first.max() - PEAK_TOLERANCE * np.ptp(first) else None
 
 
 def _continued(network: Network, gait: str, onset: float) -> FourierOrbit | None:
@@ -328,7 +328,7 @@ def beside(network: Network, near: FourierOrbit) -> FourierOrbit:
 
 
 #: Size of a guess's last harmonics, over the largest, that needs more nodes, or a mesh.
-STEEP = 1e-3
+TAIL_THRESHOLD = 1e-3
 
 
 def from_path(network: Network, symmetry: Symmetry, path: Path, period: float,
@@ -337,14 +337,14 @@ def from_path(network: Network, symmetry: Symmetry, path: Path, period: float,
     def rows(theta: np.ndarray) -> np.ndarray:
         return rows_of(network, symmetry, path(theta % 1.0))
 
-    n, orbit = NODES, None
-    while (not periods and n < MOST_NODES
-           and max(map(collocation.tail, rows(np.arange(n) / n))) > STEEP):
+    n, orbit = NUM_NODES, None
+    while (not periods and n < MAX_NODES
+           and max(map(collocation.tail, rows(np.arange(n) / n))) > TAIL_THRESHOLD):
         n = 2 * n + 1
     with suppress(NoOrbit):
         orbit = _accepted(newton(network, symmetry, rows(np.arange(n) / n), period, periods))
     # The phase of a plateau is no peak's.
-    return orbit or (None if n == NODES else _accepted(
+    return orbit or (None if n == NUM_NODES else _accepted(
         pieces.solve(network, symmetry, rows, period)))
 
 

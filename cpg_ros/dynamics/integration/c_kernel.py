@@ -38,9 +38,9 @@ from cpg_ros.networks.equations import equations_of
 from cpg_ros.networks.network import Network
 import numpy as np
 
-MOST_NODES = 2**15 - 1
+MAX_NODES = 2**15 - 1
 #: Numbers of lanes for one trajectory and for several.
-ONE, LANES = 1, 8
+ONE_LANE, LANES = 1, 8
 #: Options of the compiler for lanes: all vector registers of this machine. Every arm64 has the
 #: same ones, which compilers use anyway; not all of those take an option for this machine.
 NATIVE = ('-ffp-contract=fast', *['-march=native'] * (platform.machine() == 'x86_64'))
@@ -94,7 +94,7 @@ def is_missing(network: type[Network]) -> bool:
     """Return whether a library of a network for one trajectory could be on disk, but is not."""
     folder = generated.folder(equations_of(network).key)
     return folder is not None and not all(
-        (folder / f'{name}-{version()}.so').exists() for name in ('kernel', f'lanes{ONE}'))
+        (folder / f'{name}-{version()}.so').exists() for name in ('kernel', f'lanes{ONE_LANE}'))
 
 
 @cache
@@ -164,9 +164,9 @@ class Lane:
 
         """
         nodes = len(history[0])
-        if nodes > MOST_NODES:
+        if nodes > MAX_NODES:
             raise InputError(f'a history of {nodes} steps is too long for kernels in C: they have '
-                             f'at most {MOST_NODES}')
+                             f'at most {MAX_NODES}')
         # The arrays are kept as long as their addresses.
         self._arrays = network.coefficients, basis, *history
         p, basis_address, *past = (array.ctypes.data for array in self._arrays)

@@ -181,9 +181,10 @@ def lowered_parts(equations: Equations) -> list[LoweredPart]:
 
 # C functions of a network's right-hand side, from these loops.
 
-HEADS = {'drive': 'static void drive(const cpg_real *past, const cpg_real *p, cpg_real *driven)',
-         'field': 'static void field(const cpg_real *z, const cpg_real *driven, const cpg_real *p,'
-                  '\n                  cpg_real *out)'}
+SIGNATURES = {
+    'drive': 'static void drive(const cpg_real *past, const cpg_real *p, cpg_real *driven)',
+    'field': 'static void field(const cpg_real *z, const cpg_real *driven, const cpg_real *p,'
+             '\n                  cpg_real *out)'}
 
 
 class _Printer(C99CodePrinter):  # type: ignore[misc]
@@ -300,7 +301,7 @@ def _c_function(part: LoweredPart, names: _Names) -> str:
     body = '\n'.join(lines)
     arrays += [f'    (void){name};' for name in ('p', *(['driven'] if out == 'out' else []))
                if f'{name}[' not in body]
-    return '\n'.join([HEADS[part.name], '{', *arrays, body, '}'])
+    return '\n'.join([SIGNATURES[part.name], '{', *arrays, body, '}'])
 
 
 def field_source(equations: Equations, cells: int, each: bool = False, lanes: int = 0

@@ -24,7 +24,7 @@ import warnings
 
 from cpg_ros.common.command_line import progress_bar
 from cpg_ros.common.errors import InputError, ShortRepr
-from cpg_ros.dynamics.integration.c_kernel import LaneBlock, LANES, lanes_of, ONE
+from cpg_ros.dynamics.integration.c_kernel import LaneBlock, LANES, lanes_of, ONE_LANE
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
@@ -34,10 +34,10 @@ import numpy as np
 #: slopes.
 History = np.ndarray | Sequence[float] | Callable[[np.ndarray], np.ndarray]
 
-#: CHUNK: work between two updates of the progress bar, components times steps.
-CHUNK = 20_000_000
-#: NOISY: work of a step with noise, over that of one without; its random numbers take memory.
-NOISY = 16
+#: Work between two updates of the progress bar, components times steps.
+CHUNK_WORK = 20_000_000
+#: Work of a step with noise, over that of one without; its random numbers take memory.
+NOISE_WORK = 16
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -147,7 +147,7 @@ class _Lanes:
         components, cells = networks[0].components, networks[0].cells
         # Five nodes at least, so that slopes of a given history are of fourth order.
         nodes = max(5, int(np.ceil(max(member.delay for member in networks) / step)) + 2)
-        lanes = ONE if batch == 1 else LANES
+        lanes = ONE_LANE if batch == 1 else LANES
         blocks = -(-batch // lanes)
         members = np.minimum(np.arange(blocks * lanes), batch - 1).reshape(blocks, lanes)
         #: States, and slopes after and before each node.
@@ -178,7 +178,7 @@ class _Lanes:
         _, blocks, nodes, components, lanes = self._ring.shape
         steps, head, done = rows * every, nodes - 1, 0
         states, slopes = np.empty((2, blocks, lanes, rows + 1, components))
-        size = blocks * components * lanes * (NOISY if noise else 1)
+        size = blocks * components * lanes * (NOISE_WORK if noise else 1)
 
         def advance(k: int, count: int, number: int) -> int:
             random = np.random.default_rng([seed, done, k])
@@ -193,7 +193,7 @@ class _Lanes:
         with (progress_bar('simulating', steps, enabled=progress) as bar,
               ThreadPoolExecutor(min(blocks, os.cpu_count() or 1)) as pool):
             while done < steps:
-                count = min(steps - done, max(1, CHUNK // size))
+                count = min(steps - done, max(1, CHUNK_WORK // size))
                 work = range(blocks), repeat(count), repeat(done + 1)
                 *_, head = map(advance, *work) if blocks == 1 else pool.map(advance, *work)
                 done += count

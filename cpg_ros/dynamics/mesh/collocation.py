@@ -30,8 +30,8 @@ from numpy.polynomial import legendre, polynomial
 
 #: Nodes of an interval.
 S = 8
-#: FLOOR: least density of a mesh, over the mean.
-FLOOR = 0.2
+#: Of a mesh, over the mean.
+MIN_DENSITY = 0.2
 
 _X, _W = legendre.leggauss(S)
 #: NODES: places of the nodes in an interval [0, 1]; WEIGHTS: their Gauss weights.
@@ -88,7 +88,7 @@ def spread(mesh: np.ndarray, density: np.ndarray, n: int) -> np.ndarray:
     """
     # No interval may be far longer than its neighbours. The floor is a fraction of the mean, so
     # that a long rest before a short jump takes few intervals.
-    density = np.maximum(density, FLOOR * (density * np.diff(mesh)).sum())
+    density = np.maximum(density, MIN_DENSITY * (density * np.diff(mesh)).sum())
     for _ in range(2):
         padded = np.concatenate([density[-1:], density, density[:1]])
         density = np.maximum(density, 0.5 * np.maximum(padded[:-2], padded[2:]))
@@ -101,11 +101,11 @@ def spread(mesh: np.ndarray, density: np.ndarray, n: int) -> np.ndarray:
 # Meshes with ends at the kinks of the rates, which keep the order of the collocation.
 
 #: Positions in an interval between which changes of sign are searched.
-PLACES = np.linspace(0.0, 1.0, 9)
+POSITIONS = np.linspace(0.0, 1.0, 9)
 #: Distance between a kink and an end on it.
-ON = 1e-13
+KINK_TOLERANCE = 1e-13
 #: Distance below which an end moves onto a kink, over the shorter interval beside it.
-NEAR = 0.4
+SNAP_RATIO = 0.4
 
 
 def sign_changes(mesh: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
@@ -116,9 +116,9 @@ def sign_changes(mesh: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
         coefficients: of the variables' polynomials on each, shape (S + 1, n, variables).
 
     """
-    values = polynomial.polyval(PLACES[:, None, None], coefficients[:, None], tensor=False)
+    values = polynomial.polyval(POSITIONS[:, None, None], coefficients[:, None], tensor=False)
     begin, interval, variable = np.nonzero(values[:-1] * values[1:] < 0.0)
-    low, high = PLACES[begin], PLACES[begin + 1]
+    low, high = POSITIONS[begin], POSITIONS[begin + 1]
     terms = coefficients[:, interval, variable]
     rising = values[begin + 1, interval, variable] > 0.0
     for _ in range(60):
@@ -139,11 +139,12 @@ def aligned(mesh: np.ndarray, kinks: np.ndarray) -> np.ndarray | None:
 
     """
     gaps = np.abs(mesh[:, None] - kinks).min(axis=0) if kinks.size else np.zeros(0)
-    if not (gaps > ON).any():
+    if not (gaps > KINK_TOLERANCE).any():
         return None
-    fixed = [0.0, 1.0, *(kink for kink in kinks if ON < kink < 1.0 - ON)]
+    fixed = [0.0, 1.0, *(kink for kink in kinks if KINK_TOLERANCE < kink < 1.0 - KINK_TOLERANCE)]
     free = [end for k, end in enumerate(mesh[1:-1], 1) if not any(
-        abs(end - kink) < NEAR * min(end - mesh[k - 1], mesh[k + 1] - end) for kink in fixed)]
+        abs(end - kink) < SNAP_RATIO * min(end - mesh[k - 1], mesh[k + 1] - end)
+        for kink in fixed)]
     return np.array(sorted({*fixed, *free}))
 
 

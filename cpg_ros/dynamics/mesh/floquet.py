@@ -30,7 +30,7 @@ from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.dynamics.isotypic import split
 from cpg_ros.dynamics.mesh import collocation
 from cpg_ros.dynamics.mesh.collocation import addresses, chained, solver, summed, transfer
-from cpg_ros.dynamics.mesh.orbit import evaluate, MeshOrbit, MOST_INTERVALS, path_of, Reduced
+from cpg_ros.dynamics.mesh.orbit import evaluate, MAX_INTERVALS, MeshOrbit, path_of, Reduced
 from cpg_ros.dynamics.mesh.solve import kinks
 from cpg_ros.dynamics.orbit import NOT_ISOLATED, Waveforms
 from cpg_ros.networks.equations import Field, States
@@ -38,9 +38,9 @@ import numpy as np
 import scipy
 
 #: Relative size of the last terms of its polynomials at which an interval is resolved.
-RESOLVED = 1e-9
+INTERVAL_TOLERANCE = 1e-9
 #: Singular value below which a disturbance other than along the orbit does not decay.
-SINGULAR = 1e-9
+SINGULAR_TOLERANCE = 1e-9
 
 
 def adjoint(orbit: MeshOrbit) -> Waveforms:
@@ -55,7 +55,7 @@ def adjoint(orbit: MeshOrbit) -> Waveforms:
         coefficients, unresolved = _on_mesh(orbit, mesh)
         if not unresolved.any():
             break
-        if mesh.size + unresolved.sum() > 4 * MOST_INTERVALS:
+        if mesh.size + unresolved.sum() > 4 * MAX_INTERVALS:
             raise NoOrbit('the phase response is too steep to be resolved')
         middles = 0.5 * (mesh[:-1] + mesh[1:])[unresolved]
         mesh = np.sort(np.concatenate([mesh, middles]))
@@ -88,7 +88,7 @@ def _on_mesh(orbit: MeshOrbit, mesh: np.ndarray) -> tuple[np.ndarray, np.ndarray
         end, _, _, sizes = np.linalg.lstsq(matrix, np.append(np.zeros(d), 1.0), rcond=None)
     except np.linalg.LinAlgError as error:
         raise NoOrbit(NOT_ISOLATED) from error
-    if not sizes[-1] > SINGULAR:
+    if not sizes[-1] > SINGULAR_TOLERANCE:
         raise NoOrbit(NOT_ISOLATED)
     points = whole @ end
     slopes = -np.einsum('nsij,nsjk,nk->nsi', back, answers, points[:-1])[::-1, ::-1]
@@ -96,17 +96,16 @@ def _on_mesh(orbit: MeshOrbit, mesh: np.ndarray) -> tuple[np.ndarray, np.ndarray
     ends = collocation.last_fraction(slopes) * lengths / np.abs(points).max()
     # The cells of a class share its response.
     alike = np.tile(np.bincount(orbit.symmetry.classes), orbit.network.variables)
-    return coefficients / alike, ends > RESOLVED
+    return coefficients / alike, ends > INTERVAL_TOLERANCE
 
 
 # Eigenvalues of a product of many matrices, each relative to its own size.
 
 #: Distance below which two subspaces are the same.
-SAME = 1e-13
-#: Largest ratio of the sizes of the eigenvalues of a block.
-ALIKE = 1e4
-#: Iterations at most.
-ROUNDS = 40
+SUBSPACE_TOLERANCE = 1e-13
+#: Of the eigenvalues of a block.
+MAX_SIZE_RATIO = 1e4
+MAX_ITERATIONS = 40
 
 
 def eigenvalues(factors: np.ndarray) -> np.ndarray:
@@ -123,16 +122,17 @@ def eigenvalues(factors: np.ndarray) -> np.ndarray:
     # Generic columns, which lie in no invariant subspace.
     columns = np.ascontiguousarray(np.linalg.qr(np.random.default_rng(0).normal(size=(d, d)))[0])
     work = np.empty((3, d, d))
-    for _ in range(ROUNDS):
+    for _ in range(MAX_ITERATIONS):
         start, whole = columns.copy(), np.eye(d)
         solver().mesh_round(len(factors), d, *addresses(factors, columns, whole, work))
         back = start.T @ columns
         if not np.isfinite(back).all():
             return np.full(d, np.nan, dtype=complex)
-        cuts = [0, *(k for k in range(1, d) if np.abs(back[k:, :k]).max() <= SAME), d]
+        cuts = [0, *(k for k in range(1, d)
+                     if np.abs(back[k:, :k]).max() <= SUBSPACE_TOLERANCE), d]
         blocks = [slice(*ends) for ends in pairwise(cuts)]
         sizes = [np.abs(np.diag(whole)[block]) for block in blocks]
-        if all(size.max() <= ALIKE * size.min() for size in sizes):
+        if all(size.max() <= MAX_SIZE_RATIO * size.min() for size in sizes):
             break
     return np.concatenate([
         np.linalg.eigvals(back[block, block] @ whole[block, block]).astype(complex)

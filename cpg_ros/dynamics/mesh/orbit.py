@@ -36,17 +36,15 @@ from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 from numpy.polynomial import polynomial
 
-#: RESOLVED: relative size of the last terms of the polynomials at which a mesh is resolved.
-RESOLVED = 1e-11
-#: FEWEST, MOST_INTERVALS: limits of the number of intervals of a mesh.
-FEWEST, MOST_INTERVALS = 12, 800
-#: FEW: number of intervals of a first mesh; LOOKED: places of each at which the curvature of the
-#: guess is evaluated.
-FEW, LOOKED = 30, 17
-#: TOLERANCE: relative size of Newton's step at which it stops; the remaining error is of order its
+#: Relative size of the last terms of the polynomials at which a mesh is resolved.
+INTERVAL_TOLERANCE = 1e-11
+MIN_INTERVALS, MAX_INTERVALS = 12, 800
+#: Intervals of a first mesh; positions in each at which the curvature of the guess is evaluated.
+FIRST_INTERVALS, GUESS_POINTS = 30, 17
+#: Relative size of Newton's step at which it stops; the remaining error is of order its
 #: square.
 TOLERANCE = 1e-8
-STEPS = 15
+NEWTON_ITERATIONS = 15
 
 
 class Reduced(Field):
@@ -127,7 +125,7 @@ def newton(reduced: Reduced, now: Solution, periods: Sequence[float] = ()) -> bo
     """
     scale = np.abs(now.points).max()
     d, longest = now.points.shape[1], 20.0 * now.length
-    for _ in range(2 * STEPS if periods else STEPS):
+    for _ in range(2 * NEWTON_ITERATIONS if periods else NEWTON_ITERATIONS):
         try:
             p, r, by_start, by_source = linearised(reduced, now)
             right = np.empty(d + 1)
@@ -187,7 +185,7 @@ def finer(mesh: np.ndarray) -> int:
     return n + 1 + n // 16
 
 
-def remeshed(reduced: Reduced, now: Solution, fewest: int = FEWEST) -> np.ndarray | None:
+def remeshed(reduced: Reduced, now: Solution, fewest: int = MIN_INTERVALS) -> np.ndarray | None:
     """Return a better mesh for a solution, or None if it is resolved.
 
     Raises:
@@ -196,17 +194,18 @@ def remeshed(reduced: Reduced, now: Solution, fewest: int = FEWEST) -> np.ndarra
     """
     h, slopes = np.diff(now.mesh), reduced.rates(now.stages)
     ends = collocation.last_fraction(slopes) * now.length * h / np.abs(now.points).max()
-    if ends.max() <= RESOLVED:
+    if ends.max() <= INTERVAL_TOLERANCE:
         return None
-    needed = 1.25 * (ends**(1.0 / collocation.S)).mean() / RESOLVED**(1.0 / collocation.S) * h.size
+    needed = (1.25 * (ends**(1.0 / collocation.S)).mean()
+              / INTERVAL_TOLERANCE**(1.0 / collocation.S) * h.size)
     # `needed` is NaN if the solution is not finite.
-    if not max(fewest, needed) <= MOST_INTERVALS:
-        raise NoOrbit(f'the waveform is too steep for {MOST_INTERVALS} intervals')
+    if not max(fewest, needed) <= MAX_INTERVALS:
+        raise NoOrbit(f'the waveform is too steep for {MAX_INTERVALS} intervals')
     return collocation.spread(now.mesh, ends**(1.0 / collocation.S) / h, max(fewest, int(needed)))
 
 
 def first_mesh(reduced: Reduced, path: Callable[[np.ndarray], np.ndarray],
-               intervals: int = FEW, steps: np.ndarray | None = None) -> np.ndarray:
+               intervals: int = FIRST_INTERVALS, steps: np.ndarray | None = None) -> np.ndarray:
     """Return a mesh of few intervals for a path over the places 0 to 1, by how it bends.
 
     Args:
@@ -220,7 +219,7 @@ def first_mesh(reduced: Reduced, path: Callable[[np.ndarray], np.ndarray],
         ends = steps * reduced.symmetry.order
         ends = ends[(ends > 0.0) & (ends < 1.0)]
         return np.concatenate([[0.0], ends[::max(1, ends.size // intervals)], [1.0]])
-    positions = np.linspace(0.0, 1.0, LOOKED * intervals + 1)
+    positions = np.linspace(0.0, 1.0, GUESS_POINTS * intervals + 1)
     bend = np.abs(np.diff(reduced.rates(path(positions)), axis=0)).max(axis=1)
     return collocation.spread(positions, np.sqrt(bend + 1e-3 * bend.max() + 1e-300), intervals)
 
@@ -264,10 +263,10 @@ def derivatives(reduced: Reduced, now: Solution) -> tuple[np.ndarray, np.ndarray
 
 # Orbits as polynomials on a mesh: the gaits of the networks without delay.
 
-#: SAMPLES: number of even points of a cycle that resolve a relaxation oscillation.
+#: Even points of a cycle that resolve a relaxation oscillation.
 SAMPLES = 8192
 #: Positions in an interval, 0 to 1, at which the residual is computed.
-BETWEEN = np.array([0.02, 0.3, 0.5, 0.7, 0.98])
+RESIDUAL_POSITIONS = np.array([0.02, 0.3, 0.5, 0.7, 0.98])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -340,7 +339,7 @@ class MeshOrbit(Orbit):
     @property
     def between(self) -> np.ndarray:
         """Times inside the intervals of T/m, model time, shape (5 n,)."""
-        positions = self.mesh[:-1, None] + np.diff(self.mesh)[:, None] * BETWEEN
+        positions = self.mesh[:-1, None] + np.diff(self.mesh)[:, None] * RESIDUAL_POSITIONS
         return positions.ravel() * self.solution.length
 
 

@@ -36,12 +36,12 @@ from cpg_ros.dynamics.mesh.orbit import (
     coefficients_of,
     columns_of,
     completed,
-    FEW,
-    FEWEST,
     finer,
+    FIRST_INTERVALS,
     first_mesh,
     linearised,
     MeshOrbit,
+    MIN_INTERVALS,
     newton,
     path_of,
     Reduced,
@@ -57,11 +57,11 @@ import numpy as np
 from numpy.polynomial import polynomial
 
 #: Numbers of intervals of first meshes; the second is for waveforms with several spikes.
-MESHES = FEW, 4 * FEW
+MESH_SIZES = FIRST_INTERVALS, 4 * FIRST_INTERVALS
 #: Iterations in which ends of intervals move onto kinks.
-ALIGNED = 8
+KINK_ITERATIONS = 8
 #: Range, over that of the guess, below which the orbit has fallen to an equilibrium.
-SMALLEST = 1e-5
+MIN_RANGE_RATIO = 1e-5
 
 
 def from_path(network: Network, symmetry: Symmetry, path: Path, period: float,
@@ -72,7 +72,7 @@ def from_path(network: Network, symmetry: Symmetry, path: Path, period: float,
     def guess(positions: np.ndarray) -> np.ndarray:
         return path(positions / symmetry.order)[:, reduced.kept]
 
-    for intervals in MESHES[:1] if periods else MESHES:
+    for intervals in MESH_SIZES[:1] if periods else MESH_SIZES:
         start = sampled(guess, first_mesh(reduced, guess, intervals, getattr(path, 'steps', None)),
                         period / symmetry.order)
         orbit = _refined(reduced, start, [excluded / symmetry.order for excluded in periods])
@@ -104,7 +104,7 @@ def predicted(network: Network, near: MeshOrbit) -> MeshOrbit | None:
 
 def _refined(reduced: Reduced, now: Solution, periods: Sequence[float] = ()) -> MeshOrbit | None:
     """Solve, remesh and solve again until the mesh is fine enough; None as in from_path."""
-    fewest, smallest = FEWEST, SMALLEST * np.ptp(now.points[:, :reduced.size])
+    fewest, smallest = MIN_INTERVALS, MIN_RANGE_RATIO * np.ptp(now.points[:, :reduced.size])
     while True:
         with np.errstate(all='ignore'):
             converged = newton(reduced, now, periods)
@@ -135,7 +135,7 @@ def _on_kinks(reduced: Reduced, now: Solution) -> bool:
     """Move ends of intervals onto all kinks, in place; return whether Newton converged."""
     if not reduced.network.kinks:
         return True
-    for _ in range(ALIGNED):
+    for _ in range(KINK_ITERATIONS):
         mesh = aligned(now.mesh, kinks(reduced, now))
         if mesh is None:
             break
@@ -226,7 +226,7 @@ class MeshCurve(ShortRepr):
                 ) -> tuple['MeshCurve', np.ndarray, np.ndarray] | None:
         """A finer mesh if the solution needs it, from the highest peak of cell 1."""
         reduced, now = self._solution(z)
-        mesh = remeshed(reduced, now, finer(now.mesh) if again else FEWEST)
+        mesh = remeshed(reduced, now, finer(now.mesh) if again else MIN_INTERVALS)
         path = path_of(reduced, now)
         start = self._highest(now, path)
         if mesh is None and not start:
@@ -301,7 +301,7 @@ def curve_beside(network: Network, symmetry: Symmetry, line: ParameterLine,
 
 
 #: Relative difference above which a peak is not the highest.
-SAME = 1e-6
+PEAK_TOLERANCE = 1e-6
 
 
 def _accepted(orbit: MeshOrbit | None) -> MeshOrbit | None:
@@ -345,7 +345,7 @@ def _stated(network: Network, gait: str) -> MeshOrbit | None:
     symmetry = network.symmetry(gait)
     orbit = _from_state(network, symmetry, *state)
     # Phase 0 is the highest peak, which a state near the orbit may miss.
-    if orbit is None or orbit.peak - orbit.waveform(np.zeros(1))[0] > SAME * orbit.peak:
+    if orbit is None or orbit.peak - orbit.waveform(np.zeros(1))[0] > PEAK_TOLERANCE * orbit.peak:
         return _by_itself(network, symmetry, *state)
     return orbit
 

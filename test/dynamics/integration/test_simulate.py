@@ -120,7 +120,7 @@ def test_a_batch_equals_single_runs(batch, monkeypatch):
                     starts if many is starts else [START] * batch, strict=True)
         single = [simulate(*pair, 3.0, 0.01)(np.linspace(0.0, 3.0, 323)) for pair in pairs]
         for chunk in (7 * 64, 10**7):
-            monkeypatch.setattr('cpg_ros.dynamics.integration.simulate.CHUNK', chunk)
+            monkeypatch.setattr('cpg_ros.dynamics.integration.simulate.CHUNK_WORK', chunk)
             runs = simulate(one, many, 3.0, 0.01)(np.linspace(0.0, 3.0, 323))
             assert np.allclose(runs, single, 0.0, 1e-10)
 
