@@ -30,13 +30,7 @@ from common import by_turns, emit, log
 from cpg_ros.analysis.nsga2 import optimise
 from cpg_ros.analysis.objectives import search_space
 from cpg_ros.dynamics.integration.simulate import Trajectory
-from cpg_ros.dynamics.settling import (
-    DURATION,
-    last_cycle,
-    population_run,
-    start_states,
-    STEP_RATIO,
-)
+from cpg_ros.dynamics.settling import last_cycle, population_run, SPAN, start_states, STEP_RATIO
 from cpg_ros.networks.library.biped import Biped, CELL, CELLS, PARTNERS, PRIMARY
 from numba import njit
 import numpy as np
@@ -85,11 +79,11 @@ def main() -> None:
 
     def compiled(k: int, **options):
         network = networks[k]
-        return solve_ivp(rates, (0.0, DURATION), starts[k], args=(
+        return solve_ivp(rates, (0.0, SPAN), starts[k], args=(
             network.current, network.phi, network.coefficients[1:, :CELLS], PLACES), **options)
 
     def plain(k: int):
-        return solve_ivp(lambda t, x: networks[k].rates(x), (0.0, DURATION), starts[k], rtol=1e-6)
+        return solve_ivp(lambda t, x: networks[k].rates(x), (0.0, SPAN), starts[k], rtol=1e-6)
 
     both = compiled(0, rtol=1e-6).y[:, -1], plain(0).y[:, -1]
     assert np.allclose(*both, atol=1e-3), 'the two right-hand sides differ'
@@ -120,7 +114,7 @@ def main() -> None:
          ivp_numpy_ms_per_network=ivp_numpy_ms, speedup_per_network=speedup,
          error_ours=[float(np.median(ours)), float(ours.max())],
          error_ivp=[float(np.median(peers)), float(peers.max())],
-         step_ours=STEP_RATIO * Biped.step, span=DURATION, networks=SETS, searches=searches,
+         step_ours=STEP_RATIO * Biped.step, span=SPAN, networks=SETS, searches=searches,
          cores=os.cpu_count(), targets=TARGETS,
          passed=(speedup >= TARGETS['speedup_per_network']
                  and bool(np.median(ours) <= np.median(peers)) and ours.max() <= peers.max()

@@ -40,25 +40,25 @@ COLOURS = {'pronk': '#805ad5', 'pace': '#2f855a', 'bound': '#b7791f', 'trot': '#
            'two_legged_hop': '#805ad5', 'skip': '#2f855a', 'gallop': '#b7791f',
            'hesitation_walk': '#97266d', 'asymmetric_hop': '#718096', 'one_legged_hop': '#975a16'}
 #: Colours of other gaits, in their network's order, and of what is no gait.
-FURTHER = ('#e53e8f', '#00a37a', '#5a67d8', '#a3a300', '#7b341e', '#38b2ff', '#ff8c42',
+MORE_COLOURS = ('#e53e8f', '#00a37a', '#5a67d8', '#a3a300', '#7b341e', '#38b2ff', '#ff8c42',
            '#b794f4', '#9ae600', '#f56565', '#234e52', '#d6bcfa', '#ffd166', '#1a365d')
 GREY = '#4a5568'
 #: Line styles by stability: by itself, with a symmetry lock, not at all.
 STYLES: tuple[tuple[Literal['-', '--', ':'], str], ...] = (
     ('-', 'stable'), ('--', 'stable with a lock'), (':', 'unstable'))
 #: Markers of bifurcations other than folds, filled where supercritical.
-CROSSINGS = {'torus': 'o', 'period doubling': '^', 'branch point': 'P'}
-#: BETWEEN: number of lines between two points of a branch.
-BETWEEN = 8
-#: ROOTS: most roots of each class that are drawn.
-ROOTS = 7
+MARKERS = {'torus': 'o', 'period doubling': '^', 'branch point': 'P'}
+#: Lines between two points of a branch.
+LINES_PER_STEP = 8
+#: Of each class, that are drawn.
+MAX_ROOTS = 7
 
 
 @cache
 def colours(network: type[Network]) -> dict[str, str]:
     """Return distinct colours for a network's gaits."""
     hues = (to_hex(tuple(hsv_to_rgb((0.618 * n % 1.0, 0.7, 0.8)))) for n in count())
-    spare = chain(FURTHER, hues)
+    spare = chain(MORE_COLOURS, hues)
     by_gait: dict[str, str] = {}
     for gait in sorted(network.gaits(), key=lambda gait: gait not in COLOURS):
         colour = COLOURS.get(gait, '')
@@ -73,12 +73,12 @@ def _colour(analysis: Analysis, gait: str) -> str:
 
 
 def _smooth(branch: Branch) -> np.ndarray:
-    """Interpolate values and amplitudes along a branch, shape (2, BETWEEN (points - 1) + 1)."""
+    """Interpolate values and amplitudes along a branch, shape (2, n)."""
     path = np.stack([branch.values, branch.amplitudes])
     sizes = np.ptp(path, axis=1, keepdims=True)
     chords = np.linalg.norm(np.diff(path) / np.where(sizes > 0.0, sizes, 1.0), axis=0)
     positions = np.concatenate([[0.0], np.cumsum(np.maximum(chords, 1e-9))])
-    fine = np.interp(np.arange(BETWEEN * (positions.size - 1) + 1) / BETWEEN,
+    fine = np.interp(np.arange(LINES_PER_STEP * (positions.size - 1) + 1) / LINES_PER_STEP,
                      np.arange(positions.size), positions)
     if positions.size < 3:
         return np.stack([np.interp(fine, positions, row) for row in path])
@@ -90,7 +90,7 @@ def _draw_branch(axes: Axes, branch: Branch, kinds: list[int], colour: str) -> N
     values, amplitudes = _smooth(branch)
     starts = [0, *(k for k in range(1, len(kinds)) if kinds[k] != kinds[k - 1]), len(kinds)]
     for begin, end in pairwise(starts):
-        part = slice(BETWEEN * max(begin - 1, 0), BETWEEN * (end - 1) + 1)
+        part = slice(LINES_PER_STEP * max(begin - 1, 0), LINES_PER_STEP * (end - 1) + 1)
         axes.plot(values[part], amplitudes[part], color=colour,
                   linestyle=STYLES[kinds[begin]][0], linewidth=1.6)
     for k in branch.fold_indices:
@@ -106,10 +106,10 @@ def _draw_branches(axes: Axes, analysis: Analysis, assessed: Sequence[AssessedBr
         shown.add(gait)
         soft = {loss.point for loss in member.losses if loss.form.soft}
         for point in member.crossings:
-            axes.plot(point.value, point.point.amplitude, marker=CROSSINGS[point.kind],
+            axes.plot(point.value, point.point.amplitude, marker=MARKERS[point.kind],
                       markersize=6, color=colour,
                       markerfacecolor=colour if point in soft else axes.get_facecolor())
-            met[point.kind + (' (soft)' if point in soft else '')] = CROSSINGS[point.kind]
+            met[point.kind + (' (soft)' if point in soft else '')] = MARKERS[point.kind]
         for end, last in zip(branch.ends, (branch.points[0], branch.points[-1]), strict=True):
             if end.why == 'period':
                 axes.plot(last.value, last.amplitude, marker='x', color=colour)
@@ -147,7 +147,7 @@ def _draw_branches(axes: Axes, analysis: Analysis, assessed: Sequence[AssessedBr
 
 def _draw_roots(axes: Axes, analysis: Analysis) -> None:
     for block in analysis.blocks:
-        roots = block.roots(ROOTS)
+        roots = block.roots(MAX_ROOTS)
         axes.plot(roots.real, roots.imag, 'o', color=_colour(analysis, block.gait), alpha=0.8,
                   markersize=5)
     title = 'Characteristic roots of the equilibrium' if analysis.delay else (

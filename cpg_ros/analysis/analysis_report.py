@@ -80,9 +80,9 @@ COMMENTARIES = {
 
 
 #: Error of the trivial multiplier that the report mentions.
-UNSURE = 1e-6
+ERROR_THRESHOLD = 1e-6
 #: Distance from 0 at which a variable lies on a kink at the equilibrium.
-ON_KINK = 1e-12
+KINK_TOLERANCE = 1e-12
 
 
 def _root(value: complex) -> str:
@@ -152,7 +152,7 @@ class Analysis(ShortRepr):
             rest = equilibrium(self.network)
             levels = rest.reshape(self.network.variables, -1)
             on = [name for name in self.network.kinks
-                  if np.abs(levels[self.network.states.index(name)]).min() < ON_KINK]
+                  if np.abs(levels[self.network.states.index(name)]).min() < KINK_TOLERANCE]
             if on:
                 return [], (), np.array([]), (f'it lies on a kink of the rates, where '
                                               f'{" and ".join(on)} is 0: they have no '
@@ -221,7 +221,7 @@ class Analysis(ShortRepr):
         lines += [f'  {orbit.gait}: the multiplier along the orbit comes out as '
                   f'{abs(orbit.multipliers.trivial):.6g} instead of 1; the others are no better'
                   for whole in self.existing for orbit in whole.orbits
-                  if orbit.multipliers.error > UNSURE]
+                  if orbit.multipliers.error > ERROR_THRESHOLD]
         reasons: dict[str, list[str]] = {}
         for verdict in self.gaits.values():
             if verdict.orbit is None and verdict.gait != self.network.unnamed:
@@ -359,7 +359,7 @@ class Analysis(ShortRepr):
 
 
 #: Difference of values, over their range, at which two branches cross the same point.
-SAME_VALUE = 1e-6
+VALUE_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -393,7 +393,7 @@ class EquilibriumReport(ShortRepr):
             # A branch that has turned round may pass the images of its points.
             for one in branch.crossings:
                 if not any(k == other and (one.kind, one.block.mode) == (met.kind, met.block.mode)
-                           and abs(one.value - met.value) <= SAME_VALUE * (high - low)
+                           and abs(one.value - met.value) <= VALUE_TOLERANCE * (high - low)
                            for other, met in crossings):
                     crossings.append((k, one))
         return cls(found, sorted(crossings, key=lambda pair: pair[1].value), line)
@@ -442,8 +442,8 @@ class EquilibriumReport(ShortRepr):
                 for k, one in self.crossings]}
 
 
-#: CURVE_POINTS: points of a cycle in JSON; FINE: points among which extremes are searched for.
-CURVE_POINTS, FINE = 64, 1024
+#: Points of a cycle in JSON, and those among which extremes are searched for.
+CURVE_POINTS, EXTREMUM_POINTS = 64, 1024
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -474,7 +474,7 @@ class PhaseReport(ShortRepr):
         """Return tables of the largest advances and delays, of locking ranges and diffusion."""
         rows: list[tuple[str, ...]] = [('gait', 'cells', 'input to', 'advance', 'at', 'delay',
                                         'at', 'locking')]
-        theta = np.arange(FINE) / FINE
+        theta = np.arange(EXTREMUM_POINTS) / EXTREMUM_POINTS
         spread = []
         for gait, response in self.responses.items():
             locks, first = locking(response), response.orbit.symmetry.first

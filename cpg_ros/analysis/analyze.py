@@ -46,10 +46,10 @@ examples:
   analyze --network delayed --preset liu2024_trot --equilibria --along c --range 1:8
 
 exit codes: 0 analysed (even if no gait was found), 2 invalid arguments."""
-#: LONGEST: largest delay up to which Hopf points can be searched for, model time.
-LONGEST = 100.0
-#: MOST_STATES: most random states of a basin.
-MOST_STATES = 1_000_000
+#: Up to which Hopf points can be searched for, model time.
+MAX_DELAY = 100.0
+#: Random states of a basin.
+MAX_STATES = 1_000_000
 
 
 def _parser() -> Parser:
@@ -89,14 +89,14 @@ def _analysed(args: Namespace) -> Analysis:
     for option, file in (('--plot', args.plot), ('--prc', args.prc)):
         if file is not None and not file.absolute().parent.is_dir():
             raise InputError(f'{option}: there is no folder {file.parent}')
-    if args.basin is not None and not 1 <= args.basin <= MOST_STATES:
-        raise InputError(f'--basin: {args.basin} is not from 1 to {MOST_STATES}')
+    if args.basin is not None and not 1 <= args.basin <= MAX_STATES:
+        raise InputError(f'--basin: {args.basin} is not from 1 to {MAX_STATES}')
     if args.seed is not None and (args.basin is None or args.seed < 0):
         raise InputError('--seed: it must be 0 or more, and goes with --basin')
     preset, network = preset_from(args)
     longest = 2.0 * network.delay if args.longest_delay is None else args.longest_delay
-    if not 0.0 <= longest <= LONGEST:
-        raise InputError(f'--longest-delay: {longest:g} is not from 0 to {LONGEST:g}')
+    if not 0.0 <= longest <= MAX_DELAY:
+        raise InputError(f'--longest-delay: {longest:g} is not from 0 to {MAX_DELAY:g}')
     span = network.span or (0.0, max(longest, 1.01 * network.delay))
     try:
         along = ParameterLine.parse(args.along or network.line, type(network))

@@ -36,19 +36,18 @@ from scipy.stats import binomtest
 if TYPE_CHECKING:
     from cpg_ros.analysis.analysis_report import Analysis
 
-#: CYCLES: cycles of a run; KEPT: recorded points of a cycle; TOGETHER: runs that advance together.
-CYCLES, KEPT, TOGETHER = 100, 64, 64
-#: WIDTH: range of the random states over the orbit's range.
-WIDTH = 2.0
-#: SAME: relative difference of equal signals; SAME_PERIOD: relative difference of equal periods.
-SAME, SAME_PERIOD = 0.05, 0.01
+#: Cycles of a run; recorded points of a cycle; runs that advance together.
+NUM_CYCLES, POINTS, BATCH_SIZE = 100, 64, 64
+#: Range of the random states over the orbit's range.
+STATE_RANGE = 2.0
+#: Relative differences of equal signals and periods.
+SIGNAL_TOLERANCE, PERIOD_TOLERANCE = 0.05, 0.01
 #: Relative difference of signals up to which a symmetry holds.
-HOLDS = 0.01
-#: RESTS: range of the last cycles, over the orbit's, below which a network rests; LAST: number of
-#: these cycles.
-RESTS, LAST = 1e-3, 3
+SYMMETRY_TOLERANCE = 0.01
+#: Range of the last cycles, over the orbit's, below which a network rests; number of these cycles.
+REST_TOLERANCE, REST_CYCLES = 1e-3, 3
 #: Ends of runs that are not a gait.
-REST, AWAY, UNKNOWN = 'rest', 'runs away', 'unknown'
+REST, DIVERGENT, UNKNOWN = 'rest', 'runs away', 'unknown'
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -94,7 +93,8 @@ class Basin(ShortRepr):
 def random_states(orbit: Orbit, count: int, seed: int) -> np.ndarray:
     """Draw states about an orbit, shape (count, components)."""
     levels = orbit.levels[orbit.waves].transpose(1, 0, 2).reshape(-1, 2)
-    draws = np.random.default_rng(seed).uniform(-WIDTH, WIDTH, (count, orbit.network.components))
+    draws = np.random.default_rng(seed).uniform(-STATE_RANGE, STATE_RANGE,
+                                                (count, orbit.network.components))
     return levels[:, 0] + draws * levels[:, 1]
 
 
@@ -117,11 +117,11 @@ def basin(orbit: Orbit, count: int, seed: int = 0, gain: float = 0.0,
         raise InputError(f'{count} random states: there must be at least 1')
     starts, ends = random_states(orbit, count, seed), Counter[str]()
     network, period = orbit.network, orbit.period
-    every = max(1, int(np.ceil(period / network.step / KEPT)))
-    for first in range(0, count, TOGETHER):
+    every = max(1, int(np.ceil(period / network.step / POINTS)))
+    for first in range(0, count, BATCH_SIZE):
         done(first)
-        batch = simulate(network, starts[first:first + TOGETHER], CYCLES * period,
-                         period / (KEPT * every), every=every, progress=False, quiet=True,
+        batch = simulate(network, starts[first:first + BATCH_SIZE], NUM_CYCLES * period,
+                         period / (POINTS * every), every=every, progress=False, quiet=True,
                          lock=(gain, orbit.symmetry) if gain else None)
         ends.update(end_of(Trajectory(batch.t, x, slopes), orbit)
                     for x, slopes in zip(batch.x, batch.slopes, strict=True))
@@ -140,14 +140,14 @@ def end_of(run: Trajectory, orbit: Orbit) -> str:
     """
     network = orbit.network
     if not np.isfinite(run.x[-1]).all():
-        return AWAY
-    last = run.x[-int(np.ceil(LAST * orbit.period / run.t[1])):]
-    if np.ptp(last, axis=0).max() < RESTS * 2.0 * orbit.levels[..., 1].max():
+        return DIVERGENT
+    last = run.x[-int(np.ceil(REST_CYCLES * orbit.period / run.t[1])):]
+    if np.ptp(last, axis=0).max() < REST_TOLERANCE * 2.0 * orbit.levels[..., 1].max():
         return REST
     cycle = last_cycle(run, network.cells)
     if cycle is None:
         return UNKNOWN
-    if abs(cycle.period / orbit.period - 1.0) < SAME_PERIOD and _is(cycle, orbit):
+    if abs(cycle.period / orbit.period - 1.0) < PERIOD_TOLERANCE and _is(cycle, orbit):
         return orbit.gait
     gait = _named(cycle, network)
     return f'another {gait}' if gait == orbit.gait else gait
@@ -164,7 +164,7 @@ def _is(cycle: LimitCycle, orbit: Orbit) -> bool:
         waves = np.fft.rfft(image - image.mean(axis=0), axis=0).conj()
         late = int(np.fft.irfft((seen * waves).sum(axis=1), points).argmax())
         gap = np.abs(cycle.signals - np.roll(image, late, axis=0)).max(axis=0)
-        if (gap < SAME * np.ptp(exact, axis=0).max()).all():
+        if (gap < SIGNAL_TOLERANCE * np.ptp(exact, axis=0).max()).all():
             return True
     return False
 
@@ -177,8 +177,8 @@ def _named(cycle: LimitCycle, network: Network) -> str:
         if len(symmetry.group.elements) > 1 and all(
                 np.abs(signals[:, list(symmetry.group.elements[name])]
                        - np.roll(signals, -round(float(shift) * len(signals)), axis=0)).max()
-                < HOLDS * np.ptp(signals) for name, shift in symmetry.shifts
-                ) and not signal_symmetry(symmetry, signals, HOLDS):
+                < SYMMETRY_TOLERANCE * np.ptp(signals) for name, shift in symmetry.shifts
+                ) and not signal_symmetry(symmetry, signals, SYMMETRY_TOLERANCE):
             return gait
     return UNKNOWN
 

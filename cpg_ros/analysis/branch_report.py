@@ -31,13 +31,12 @@ from cpg_ros.dynamics.hopf import HopfPoint
 from cpg_ros.dynamics.orbit import Orbit
 from cpg_ros.dynamics.orbit_normal_form import loses_stability, orbit_normal_form, OrbitNormalForm
 
-#: POINTS: most points of a branch; LONGEST: largest arclength between them; SLOWEST: largest ratio
-#: of the last period to the first, as branches wind near a homoclinic orbit; BRANCHES: most
-#: branches.
-POINTS, LONGEST, SLOWEST, BRANCHES = 80, 0.3, 5.0, 12
-#: BEYOND: kind of a loss of stability -> motion that branches off.
-BEYOND = {'torus': 'a torus', 'period doubling': 'a gait of two strides',
-          'branch point': 'a gait of less symmetry'}
+#: Points of a branch; arclength between them; ratio of the last period to the first, as branches
+#: wind near a homoclinic orbit.
+MAX_POINTS, MAX_STEP, MAX_PERIOD_RATIO, MAX_BRANCHES = 80, 0.3, 5.0, 12
+#: Kind of a loss of stability -> motion that branches off.
+BRANCHING_MOTIONS = {'torus': 'a torus', 'period doubling': 'a gait of two strides',
+                     'branch point': 'a gait of less symmetry'}
 
 
 @dataclass(frozen=True)
@@ -59,7 +58,7 @@ class StabilityLoss:
         """Return it as a line."""
         verdict = self.form.verdict
         if self.form.soft is not None:
-            verdict += (f': {BEYOND[self.point.kind]} branches off and is stable'
+            verdict += (f': {BRANCHING_MOTIONS[self.point.kind]} branches off and is stable'
                         if self.form.soft else ': no stable motion nearby, the gait jumps')
         return (f'{self.gait} loses stability at {along} {self.point.value:.6g} '
                 f'({self.point.kind}), {verdict}')
@@ -124,7 +123,7 @@ def _branches(analysis: Analysis) -> list[tuple[str, Branch]]:
     low, high = _span(analysis)
     value = analysis.along.value(analysis.network)
     branches: list[tuple[str, Branch]] = []
-    for point in on_line(analysis)[:BRANCHES]:
+    for point in on_line(analysis)[:MAX_BRANCHES]:
         branches.extend((point.gait, branch) for branch in _born(point, analysis))
     for verdict in analysis.existing:
         orbit = verdict.known_orbit
@@ -132,8 +131,8 @@ def _branches(analysis: Analysis) -> list[tuple[str, Branch]]:
                 gait == verdict.gait and _holds(branch, value, orbit)
                 for gait, branch in branches):
             branches.append((verdict.gait,
-                             continue_orbit(orbit, analysis.along, low, high, most=POINTS,
-                                            longest_step=LONGEST, longest=SLOWEST)))
+                             continue_orbit(orbit, analysis.along, low, high, most=MAX_POINTS,
+                                            longest_step=MAX_STEP, longest=MAX_PERIOD_RATIO)))
     return branches
 
 
@@ -164,7 +163,7 @@ def _born(point: HopfPoint, analysis: Analysis) -> list[Branch]:
     """Return the branch of a Hopf point, or None if its first orbit cannot be found."""
     low, high = _span(analysis)
     try:
-        return [continue_from_hopf(point, analysis.along, low, high, most=POINTS,
-                                   longest=SLOWEST, longest_step=LONGEST)]
+        return [continue_from_hopf(point, analysis.along, low, high, most=MAX_POINTS,
+                                   longest=MAX_PERIOD_RATIO, longest_step=MAX_STEP)]
     except NoOrbit:
         return []

@@ -36,9 +36,9 @@ from matplotlib.figure import Figure
 import numpy as np
 
 #: Fraction of the weight above which a foot stands.
-STANDING = 0.04
-#: SMOOTHING: time over which the speed is averaged, s.
-SMOOTHING = 0.5
+STANCE_THRESHOLD = 0.04
+#: Over which the speed is averaged, s.
+SMOOTHING_TIME = 0.5
 #: FORMATS: endings of the files that can be written.
 FORMATS = ('.png', '.svg', '.pdf')
 
@@ -80,14 +80,14 @@ def _spacing(time: np.ndarray) -> float:
 
 
 def speed(time: np.ndarray, position: np.ndarray) -> np.ndarray:
-    """Return the ground speed, m/s, shape (n,), of the path smoothed over SMOOTHING.
+    """Return the ground speed, m/s, shape (n,), of the path smoothed over SMOOTHING_TIME.
 
     Args:
         time: of the samples, s, shape (n,), evenly spaced.
         position: m, shape (n, 2).
 
     """
-    wide = max(1, min(len(time) - 1, round(SMOOTHING / _spacing(time)))) // 2 + 1
+    wide = max(1, min(len(time) - 1, round(SMOOTHING_TIME / _spacing(time)))) // 2 + 1
     low, high = np.arange(len(time)) - wide, np.arange(len(time)) + wide
     low, high = np.maximum(low, 0), np.minimum(high, len(time) - 1)
     return np.linalg.norm(position[high] - position[low], axis=1) / (time[high] - time[low])
@@ -109,7 +109,7 @@ def plot_footfalls(path: Path, legs: Sequence[str], time: np.ndarray, forces: np
         OSError: it cannot be written.
 
     """
-    least = STANDING * float(forces.sum(axis=1).mean())
+    least = STANCE_THRESHOLD * float(forces.sum(axis=1).mean())
     figure = Figure(figsize=(max(7.0, min(24.0, 0.8 * (time[-1] - time[0]))), 4.4),
                     layout='constrained')
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=[3, 2])

@@ -25,7 +25,7 @@ from dataclasses import dataclass, replace
 
 from cpg_ros.analysis.objectives import (
     evaluate,
-    MOST_EXACT,
+    MAX_EXACT,
     objective_names,
     pairs,
     phase_errors,
@@ -47,13 +47,13 @@ from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 
-#: NOISE: intensity of noise that a gait survives, per square root of model time; DURATION: of the
-#: runs, model time; RUNS: number of runs, which fit into the vector registers.
-NOISE, DURATION, RUNS = 0.01, 500.0, 8
-#: PEACE: periods without noise after that; BACK: largest phase error then, degrees.
-PEACE, BACK = 30, 1.0
-#: LOST: phase error, degrees, averaged over CYCLES cycles under noise, at which a gait is left.
-LOST, CYCLES = 60.0, 4
+#: Intensity of noise that a gait survives, per square root of model time; duration of the runs,
+#: model time; their number, which fits into the vector registers.
+NOISE, DURATION, NUM_RUNS = 0.01, 500.0, 8
+#: Without noise after that; phase error then, degrees.
+CALM_PERIODS, MAX_FINAL_ERROR = 30, 1.0
+#: Phase error, degrees, averaged over some cycles under noise, at which a gait is left.
+MAX_PHASE_ERROR, AVERAGING_CYCLES = 60.0, 4
 #: POINTS: points of a cycle; DIGITS: digits of the start and period of a preset.
 POINTS, DIGITS = 1024, 10
 
@@ -103,22 +103,22 @@ def exact_preset(preset: Preset) -> tuple[Preset, Orbit]:
 def survives(orbit: Orbit, seed: int = 0) -> bool:
     """Return whether a gait survives noise without a lock, started from its orbit."""
     network, symmetry = orbit.network, orbit.symmetry
-    starts = np.repeat(orbit(np.zeros(1)), RUNS, axis=0)
+    starts = np.repeat(orbit(np.zeros(1)), NUM_RUNS, axis=0)
     step = STEP_RATIO * network.step
     every = max(1, round(SAMPLE_PERIOD / step))
     noisy = simulate(network, starts, DURATION, step, noise=NOISE, seed=seed, every=every,
                      progress=False, quiet=True)
-    window = round(CYCLES * orbit.period / (step * every))
+    window = round(AVERAGING_CYCLES * orbit.period / (step * every))
     windows = noisy.x[:, :(noisy.t.size - 1) // window * window].reshape(
-        RUNS, -1, window, network.components)
+        NUM_RUNS, -1, window, network.components)
     if not all(_holds(window_states, symmetry) for run in windows for window_states in run):
         return False
-    calm = simulate(network, noisy.x[:, -1], PEACE * orbit.period, step, every=every,
+    calm = simulate(network, noisy.x[:, -1], CALM_PERIODS * orbit.period, step, every=every,
                     progress=False)
     for x, slopes in zip(calm.x, calm.slopes, strict=True):
         cycle = last_cycle(Trajectory(calm.t, x, slopes), network.cells)
         if (cycle is None or abs(cycle.period / orbit.period - 1.0) > 0.01
-                or phase_errors(cycle.signals, symmetry).max() > BACK
+                or phase_errors(cycle.signals, symmetry).max() > MAX_FINAL_ERROR
                 or waveform_shortfall(cycle.signals, symmetry) > 0.0):
             return False
     return True
@@ -127,13 +127,13 @@ def survives(orbit: Orbit, seed: int = 0) -> bool:
 def _holds(signals: np.ndarray, symmetry: Symmetry) -> bool:
     """Return whether the cells are alive and in phase on the mean of a few noisy cycles."""
     alive = np.ptp(signals[:, :symmetry.group.cells], axis=0).min() >= MIN_RANGE
-    return bool(alive and phase_errors(_folded(signals), symmetry).max() <= LOST)
+    return bool(alive and phase_errors(_folded(signals), symmetry).max() <= MAX_PHASE_ERROR)
 
 
 def _folded(signals: np.ndarray) -> np.ndarray:
-    """Return the mean over the cycles of a window, shape (window // CYCLES, components)."""
-    points = signals.shape[0] // CYCLES
-    return signals[:points * CYCLES].reshape(CYCLES, points, -1).mean(axis=0)
+    """Return the mean over the cycles of a window, shape (points, components)."""
+    points = signals.shape[0] // AVERAGING_CYCLES
+    return signals[:points * AVERAGING_CYCLES].reshape(AVERAGING_CYCLES, points, -1).mean(axis=0)
 
 
 def polish(score: Score, gait: str, seed: int = 0) -> VerifiedGait:
@@ -171,15 +171,15 @@ def polish(score: Score, gait: str, seed: int = 0) -> VerifiedGait:
     return VerifiedGait(preset, orbit, score.errors, leading, differences)
 
 
-#: EPOCH: generations between two migrations; MIGRANTS: fraction of a population that migrates.
-EPOCH, MIGRANTS = 3, 0.1
+#: Between two migrations; fraction of a population that migrates.
+EPOCH_GENERATIONS, MIGRATION_RATE = 3, 0.1
 
 
 # The search of Rashidi et al. 2016, section 4.
 
-#: CROSSOVER, MUTATION: rates of two-point crossover and of the mutation of a bit, as printed;
-#: BITS: of a variable, ours: three decimals of a weight, as their Table 2 has them.
-CROSSOVER, MUTATION, BITS = 0.08, 0.03, 11
+#: Of two-point crossover and of the mutation of a bit, as printed; NUM_BITS: of a variable, ours:
+#: three decimals of a weight, as their Table 2 has them.
+CROSSOVER_RATE, MUTATION_RATE, NUM_BITS = 0.08, 0.03, 11
 
 
 @dataclass(frozen=True)
@@ -201,8 +201,8 @@ class SearchSetup:
         """Return a network of the search: from its variables, or from their bits."""
         if self.paper:
             low, high = np.array([(variable.low, variable.high) for variable in self.space.free]).T
-            whole = values.reshape(-1, BITS) @ (1 << np.arange(BITS)[::-1])
-            values = low + (high - low) * whole / (2**BITS - 1)
+            whole = values.reshape(-1, NUM_BITS) @ (1 << np.arange(NUM_BITS)[::-1])
+            values = low + (high - low) * whole / (2**NUM_BITS - 1)
         return self.space.build(values)
 
 
@@ -260,11 +260,11 @@ def evolve(epoch: Epoch, progress: Callable[[int], None] = lambda generation: No
     space, paper = setup.space, setup.paper
     if paper:
         # Their objectives are the phase errors alone.
-        problem = Problem(n_var=BITS * len(space.free), n_obj=len(pairs(space.symmetry)), xl=0,
+        problem = Problem(n_var=NUM_BITS * len(space.free), n_obj=len(pairs(space.symmetry)), xl=0,
                           xu=1, vtype=bool)
         options = {'sampling': BinaryRandomSampling(),
-                   'crossover': TwoPointCrossover(prob=CROSSOVER),
-                   'mutation': BitflipMutation(prob=1.0, prob_var=MUTATION)}
+                   'crossover': TwoPointCrossover(prob=CROSSOVER_RATE),
+                   'mutation': BitflipMutation(prob=1.0, prob_var=MUTATION_RATE)}
     else:
         problem = Problem(n_var=len(space.free), n_obj=len(objective_names(space.symmetry)),
                           n_ieq_constr=1,
@@ -280,7 +280,7 @@ def evolve(epoch: Epoch, progress: Callable[[int], None] = lambda generation: No
         networks = [setup.build(values) for values in population.get('X')]
         new = list(dict.fromkeys(network for network in networks if network not in tried))
         if new:
-            scores = evaluate(new, space.gait, epoch.seed, 0 if paper else MOST_EXACT)
+            scores = evaluate(new, space.gait, epoch.seed, 0 if paper else MAX_EXACT)
             tried.update(zip(new, scores, strict=True))
         scores = [tried[network] for network in networks]
         # Sets whose waveforms miss their requirements come after all others.
@@ -320,8 +320,8 @@ def archipelago(setup: SearchSetup, population: int, generations: int, seed: int
     tried: dict[Network, Score] = {}
     starts: list[np.ndarray | None] = [None] * islands
     scores: list[tuple[Score, ...]] = [()] * islands
-    for epoch, begun in enumerate(range(0, generations, EPOCH)):
-        count = min(EPOCH, generations - begun)
+    for epoch, begun in enumerate(range(0, generations, EPOCH_GENERATIONS)):
+        count = min(EPOCH_GENERATIONS, generations - begun)
         # An epoch begins with the last generation of the previous one.
         epochs = [Epoch(setup, population, count + (epoch > 0), _random(seed, island, epoch), seed,
                         starts[island], scores[island]) for island in range(islands)]
@@ -338,7 +338,7 @@ def archipelago(setup: SearchSetup, population: int, generations: int, seed: int
 def migrate(results: Sequence[EpochResult]
             ) -> tuple[list[np.ndarray | None], list[tuple[Score, ...]]]:
     """Replace the worst of each island by the best of the previous one."""
-    many = max(1, round(MIGRANTS * len(results[0].values)))
+    many = max(1, round(MIGRATION_RATE * len(results[0].values)))
     starts: list[np.ndarray | None] = []
     scores = []
     for island, result in enumerate(results):
@@ -351,9 +351,9 @@ def migrate(results: Sequence[EpochResult]
 # Weights that give a network a gait, found by NSGA-II (Deb et al. 2000).
 
 #: Sets of the front that are verified, at most.
-TRIALS = 20
-#: SAME: resolution of phase errors in the choice of a set, degrees; LARGEST: largest allowed one.
-SAME, LARGEST = 0.1, 1.0
+MAX_VERIFIED = 20
+#: Of phase errors in the choice of a set, degrees; error of a set of the front, degrees.
+PHASE_RESOLUTION, MAX_FRONT_ERROR = 0.1, 1.0
 
 
 class NoGaitFound(CpgError):
@@ -439,17 +439,17 @@ def optimise(network_name: str, gait: str, *, population: int = 60, generations:
     if not paper:
         return _front(space, tried, seed)
     by_phase = non_dominated(list(tried), len(pairs(space.symmetry)))
-    judged = tuple(evaluate([score.network for score in by_phase], gait, seed, TRIALS))
+    judged = tuple(evaluate([score.network for score in by_phase], gait, seed, MAX_VERIFIED))
     return replace(_front(space, judged, seed), tried=tried, by_phase=tuple(by_phase))
 
 
 def _front(space: Space, tried: tuple[Score, ...], seed: int) -> Front:
     """Select a set from the front; remove those that fail the verification."""
-    left = [score for score in tried if score.exact and score.errors.max() <= LARGEST]
+    left = [score for score in tried if score.exact and score.errors.max() <= MAX_FRONT_ERROR]
     if not left:
         best = min(tried, key=lambda score: (score.errors.max(), score.shortfall, score.stability))
         raise _nothing(space, tried, _closeness(best))
-    for _ in range(TRIALS):
+    for _ in range(MAX_VERIFIED):
         front = sorted(non_dominated(left), key=_order)
         try:
             verified = polish(front[0], space.gait, seed)
@@ -465,7 +465,7 @@ def _front(space: Space, tried: tuple[Score, ...], seed: int) -> Front:
 
 def _closeness(best: Score) -> str:
     """Describe how close a set comes to its gait."""
-    if best.errors.max() > LARGEST:
+    if best.errors.max() > MAX_FRONT_ERROR:
         return f'the best has phase errors of up to {best.errors.max():.1f} degrees'
     if best.shortfall > 0.0:
         return ('the best has the phases, but a waveform is too small, turns too unsteadily or is '
@@ -480,7 +480,7 @@ def _nothing(space: Space, tried: tuple[Score, ...], why: str) -> NoGaitFound:
 
 def _order(score: Score) -> tuple[float, float]:
     """Return the sort key of a score: phase errors first, then stability."""
-    return np.ceil(score.errors.max() / SAME), score.stability
+    return np.ceil(score.errors.max() / PHASE_RESOLUTION), score.stability
 
 
 def non_dominated(scores: list[Score], objectives: int | None = None) -> list[Score]:

@@ -36,7 +36,7 @@ from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 
 #: Shipped networks whose weights can be searched.
-SEARCHED: dict[str, type[Network]] = {
+SEARCHABLE: dict[str, type[Network]] = {
     name: SHIPPED[name] for name in sorted(SHIPPED) if SHIPPED[name].searched}
 #: Decimals of the values, with which presets are written.
 DECIMALS = 4
@@ -132,7 +132,7 @@ def search_space(network_name: str, gait: str, bounds: Mapping[str, tuple[float,
     """
     if not is_path(network_name) and (network_name not in NETWORKS
                                       or not NETWORKS[network_name].searched):
-        raise InputError(f"network '{network_name}' is not one of {', '.join(SEARCHED)}")
+        raise InputError(f"network '{network_name}' is not one of {', '.join(SEARCHABLE)}")
     network = find_network(network_name)
     if not network.searched:
         raise InputError(f'the network {network.name} does not state what may be looked for')
@@ -166,25 +166,23 @@ def search_space(network_name: str, gait: str, bounds: Mapping[str, tuple[float,
 
 
 #: Sets that are simulated at once, which limits memory; a usual generation is one batch.
-LARGEST_BATCH = 256
+BATCH_SIZE = 256
 #: Deviation of a start from the gait, as a fraction of the signals (see ``_mismatch``).
 START_MISMATCH = 0.2
 #: Resolution of phase errors, degrees.
-RESOLUTION = 0.001
-#: The exact orbit is solved for at phase errors up to NEAR, degrees, and mismatch to
-#: NEAR_MISMATCH.
-NEAR, NEAR_MISMATCH = 5.0, 0.15
-#: MOST_EXACT: most sets of a generation, the most stable ones, whose orbit is solved for, as it
-#: takes 20 to 300 ms; SAME_PERIOD: largest relative difference of its period from the simulated
-#: one.
-MOST_EXACT, SAME_PERIOD = 16, 0.02
-#: LEAST_RANGE: least range of every cell; LEAST_STEADINESS: least steadiness of its rotation (see
-#: fitting.gaits.recognition.steadiness); LEAST_DIFFERENCE: least difference in shape of two
-#: waveforms; MARGIN: factor of these limits in the search.
-LEAST_RANGE, LEAST_STEADINESS, LEAST_DIFFERENCE, MARGIN = 0.15, 0.1, 0.15, 1.2
-#: WORST: phase error of a set without a gait, degrees; DEAD: stability of a set that rests or runs
-#: away; APERIODIC: stability of a set whose motion does not repeat.
-WORST, DEAD, APERIODIC = 180.0, 2.0, 1.5
+PHASE_RESOLUTION = 0.001
+#: The exact orbit is solved for at phase errors up to MAX_EXACT_ERROR, degrees, and mismatch to
+#: MAX_EXACT_MISMATCH.
+MAX_EXACT_ERROR, MAX_EXACT_MISMATCH = 5.0, 0.15
+#: Sets of a generation, the most stable ones, whose orbit is solved for, as it takes 20 to 300 ms;
+#: relative difference of its period from the simulated one.
+MAX_EXACT, PERIOD_TOLERANCE = 16, 0.02
+#: Range of every cell; steadiness of its rotation (see fitting.gaits.recognition.steadiness);
+#: difference in shape of two waveforms; factor of these limits in the search.
+MIN_RANGE, MIN_STEADINESS, MIN_DIFFERENCE, MARGIN = 0.15, 0.1, 0.15, 1.2
+#: Of a set without a gait, degrees; of one that rests or runs away; of one whose motion does not
+#: repeat.
+WORST_PHASE_ERROR, REST_STABILITY, APERIODIC = 180.0, 2.0, 1.5
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -216,7 +214,7 @@ class Score(ShortRepr):
     def objectives(self) -> np.ndarray:
         """Values to minimise: phase errors, stability, and minus the difference of waveforms."""
         rest = [self.stability] + ([] if self.difference is None else [-self.difference])
-        return np.array([*np.maximum(self.errors, RESOLUTION), *rest])
+        return np.array([*np.maximum(self.errors, PHASE_RESOLUTION), *rest])
 
 
 def pairs(symmetry: Symmetry) -> list[list[tuple[int, int]]]:
@@ -276,11 +274,11 @@ def waveform_shortfall(signals: np.ndarray, symmetry: Symmetry, margin: float = 
     noise; two waveforms must differ in shape.
     """
     cells, first = symmetry.group.cells, symmetry.first
-    have = [(np.ptp(signals[:, wave]), LEAST_RANGE) for wave in first]
-    have += [(steadiness(signals[:, wave], signals[:, wave + cells]), LEAST_STEADINESS)
+    have = [(np.ptp(signals[:, wave]), MIN_RANGE) for wave in first]
+    have += [(steadiness(signals[:, wave], signals[:, wave + cells]), MIN_STEADINESS)
              for wave in first]
     if len(first) == 2:
-        have.append((shape_difference(*signals[:, first].T), LEAST_DIFFERENCE))
+        have.append((shape_difference(*signals[:, first].T), MIN_DIFFERENCE))
     return float(sum(max(0.0, margin - max(0.0, value / least)) for value, least in have))
 
 
@@ -295,24 +293,24 @@ def _simulated(network: Network, gait: str, run: Trajectory
     if cycle is None:
         span = np.ptp(run.x[run.t.size // 2:, :cells], axis=0)
         alive = finite and span.max() >= settling.MIN_RANGE
-        return Score(network, np.full(len(pairs(symmetry)), WORST),
-                     APERIODIC if alive else DEAD, 0.0 if two else None, 10.0), None
+        return Score(network, np.full(len(pairs(symmetry)), WORST_PHASE_ERROR),
+                     APERIODIC if alive else REST_STABILITY, 0.0 if two else None, 10.0), None
     signals = cycle.signals
     errors = phase_errors(signals, symmetry)
     mismatch = _mismatch(signals, symmetry)
-    near = errors.max() <= NEAR and mismatch <= NEAR_MISMATCH
+    near = errors.max() <= MAX_EXACT_ERROR and mismatch <= MAX_EXACT_MISMATCH
     if near:
         shortfall = waveform_shortfall(signals, symmetry, MARGIN)
     else:
         # The shapes are not those of the gait, so only the range counts; two waveforms that are
         # missing count less than any that are there.
-        shortfall = max(0.0, MARGIN - np.ptp(signals[:, :cells], axis=0).min() / LEAST_RANGE)
-        shortfall += (MARGIN + errors.max() / WORST) if two else 0.0
+        shortfall = max(0.0, MARGIN - np.ptp(signals[:, :cells], axis=0).min() / MIN_RANGE)
+        shortfall += (MARGIN + errors.max() / WORST_PHASE_ERROR) if two else 0.0
     difference = (shape_difference(*signals[:, first].T) if near else 0.0) if two else None
     # Estimate the multiplier by the decay of the start's disturbance per cycle. It is above 1 if
     # the network has left the gait.
     stability = min(APERIODIC, (max(mismatch, 1e-10) / START_MISMATCH)
-                    **(cycle.period / settling.DURATION))
+                    **(cycle.period / settling.SPAN))
     score = Score(network, errors, float(stability), difference, float(shortfall))
     return score, cycle if near and shortfall == 0.0 else None
 
@@ -322,7 +320,7 @@ def _proven(score: Score, cycle: settling.LimitCycle, gait: str) -> Score:
     symmetry = score.network.symmetry(gait)
     orbit = solve_from_path(score.network, symmetry, cycle, cycle.period)
     if orbit is None or extra_symmetry(orbit) or abs(orbit.period / cycle.period
-                                                     - 1.0) > SAME_PERIOD:
+                                                     - 1.0) > PERIOD_TOLERANCE:
         # The estimate does not hold near the gait but off it.
         return replace(score, stability=max(1.0, score.stability))
     return replace(score, stability=multipliers(orbit).leading, exact=True,
@@ -330,7 +328,7 @@ def _proven(score: Score, cycle: settling.LimitCycle, gait: str) -> Score:
 
 
 def evaluate(networks: Sequence[Network], gait: str, seed: int,
-             most_exact: int = MOST_EXACT) -> list[Score]:
+             most_exact: int = MAX_EXACT) -> list[Score]:
     """Simulate the parameter sets of a generation in a batch, and score each.
 
     Args:
@@ -341,8 +339,8 @@ def evaluate(networks: Sequence[Network], gait: str, seed: int,
 
     """
     results = []
-    for first in range(0, len(networks), LARGEST_BATCH):
-        batch = networks[first:first + LARGEST_BATCH]
+    for first in range(0, len(networks), BATCH_SIZE):
+        batch = networks[first:first + BATCH_SIZE]
         runs = settling.population_run(batch, settling.start_states(batch, gait, seed))
         results += [_simulated(network, gait, Trajectory(runs.t, x, slopes))
                     for network, x, slopes in zip(batch, runs.x, runs.slopes, strict=True)]

@@ -31,7 +31,7 @@ from typing import Any
 
 from cpg_ros.analysis import gait_diagram
 from cpg_ros.analysis.nsga2 import Front, optimise
-from cpg_ros.analysis.objectives import APERIODIC, objective_names, RESOLUTION, SEARCHED
+from cpg_ros.analysis.objectives import APERIODIC, objective_names, PHASE_RESOLUTION, SEARCHABLE
 from cpg_ros.common.command_line import (
     assignment,
     named_interval,
@@ -50,10 +50,9 @@ import matplotlib
 from matplotlib.axes import Axes
 import numpy as np
 
-#: Colours. TRIED, SOLVED: of sets without and with an exact orbit; BEST: of the Pareto front.
-TRIED, SOLVED, BEST = '#cbd5e0', '#718096', '#2f855a'
-#: FLOOR: smallest multiplier that is drawn.
-FLOOR = 1e-6
+#: Of sets without and with an exact orbit, and of the Pareto front.
+INEXACT_COLOUR, EXACT_COLOUR, BEST_COLOUR = '#cbd5e0', '#718096', '#2f855a'
+MIN_MULTIPLIER = 1e-6
 
 
 def write_front(path: Path, front: Front) -> None:
@@ -83,19 +82,20 @@ def _scatter(axes: Axes, front: Front, x: str, y: str, values: dict[str, np.ndar
                    for score in front.tried])
     selected = np.array([score.network == front.best.preset.network for score in front.tried])
     exact = np.array([score.exact for score in front.tried])
-    axes.scatter(values[x][~exact], values[y][~exact], s=12, color=TRIED, marker='x',
+    axes.scatter(values[x][~exact], values[y][~exact], s=12, color=INEXACT_COLOUR, marker='x',
                  linewidths=0.7, label='tried, multiplier estimated')
     rest = exact & ~on
-    axes.scatter(values[x][rest], values[y][rest], s=12, color=SOLVED, alpha=0.7, linewidths=0,
-                 label='tried, orbit solved')
-    axes.scatter(values[x][on], values[y][on], s=22, color=BEST, label='Pareto front', zorder=3)
+    axes.scatter(values[x][rest], values[y][rest], s=12, color=EXACT_COLOUR, alpha=0.7,
+                 linewidths=0, label='tried, orbit solved')
+    axes.scatter(values[x][on], values[y][on], s=22, color=BEST_COLOUR, label='Pareto front',
+                 zorder=3)
     axes.scatter(values[x][selected], values[y][selected], s=110, facecolors='none',
                  edgecolors='#1a202c', linewidths=1.3, label='selected', zorder=4)
     for name, scale, limits in ((x, axes.set_xscale, axes.set_xlim),
                                 (y, axes.set_yscale, axes.set_ylim)):
         if 'phase' in name:
             scale('log')
-            limits(0.5 * RESOLUTION, 300.0)
+            limits(0.5 * PHASE_RESOLUTION, 300.0)
         elif 'multiplier' in name:
             scale('log')
             # Show whole decades, so that there are ticks to label.
@@ -113,7 +113,7 @@ def draw_front(path: Path, front: Front) -> None:
     multiplier = 'leading multiplier a cycle [1]'
     stability = values.pop('leading multiplier [1]')
     exact = np.array([score.exact for score in front.tried])
-    values[multiplier] = np.clip(stability, FLOOR, APERIODIC)
+    values[multiplier] = np.clip(stability, MIN_MULTIPLIER, APERIODIC)
     phases = [name for name in names if name.startswith('phase')]
     worst = 'largest phase error [deg]'
     values[worst] = np.max([values[name] for name in phases], axis=0)
@@ -167,10 +167,10 @@ def _name(text: str) -> str:
 def _parser() -> Parser:
     parser = Parser(prog='optimize', description=__doc__, epilog=EPILOG)
     parser.add_argument('--network', default='biped', metavar='NAME',
-                        help=f'{", ".join(SEARCHED)}, or the path of a Python file with a '
+                        help=f'{", ".join(SEARCHABLE)}, or the path of a Python file with a '
                         'network (default: %(default)s)')
     parser.add_argument('--gait', required=True, metavar='NAME', help='; '.join(
-        f'{name}: {" ".join(network.gaits())}' for name, network in SEARCHED.items()))
+        f'{name}: {" ".join(network.gaits())}' for name, network in SEARCHABLE.items()))
     parser.add_argument('--population', type=int, default=60, metavar='N',
                         help='parameter sets per generation (default: %(default)s)')
     parser.add_argument('--generations', type=int, default=12, metavar='N',

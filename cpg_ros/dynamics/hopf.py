@@ -418,7 +418,7 @@ def crossing_at(block: Block, line: ParameterLine, rest: np.ndarray, omega: floa
 #: Points of the grid between which crossings are refined.
 GRID_SIZE = 241
 #: Roots of a class that are followed with a delay, beside those to the right of the axis.
-NUM_EXTRA_ROOTS = 2
+NUM_SPARE = 2
 
 
 def hopf_points(network: Network, line: ParameterLine | str, low: float, high: float
@@ -534,7 +534,7 @@ def _on_grid(network: Network, line: ParameterLine, low: float, high: float) -> 
                                              point.omega, point.mode))
 
 
-def tracked_roots(along: list[Block], spare: int = NUM_EXTRA_ROOTS) -> int:
+def tracked_roots(along: list[Block], spare: int = NUM_SPARE) -> int:
     """Return how many roots of a class to follow along some blocks: without a delay, all."""
     if not any(block.past.any() for block in along):
         return len(along[0].now)

@@ -32,7 +32,7 @@ from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 
 #: Of a simulation, model time.
-DURATION, SAMPLE_PERIOD = 500.0, 0.1
+SPAN, SAMPLE_PERIOD = 500.0, 0.1
 #: Step over the network's real-time step; more exact than adaptive methods with their usual
 #: tolerances (benchmarks/bench_optimize.py).
 STEP_RATIO = 2.5
@@ -99,7 +99,7 @@ def start_states(networks: Sequence[Network], gait: str, seed: int) -> np.ndarra
 def population_run(networks: Sequence[Network], starts: np.ndarray) -> Trajectory:
     """Simulate networks from one start each, in one batch on all cores."""
     step = STEP_RATIO * networks[0].step
-    return simulate(networks, starts, DURATION, step, every=max(1, round(SAMPLE_PERIOD / step)),
+    return simulate(networks, starts, SPAN, step, every=max(1, round(SAMPLE_PERIOD / step)),
                     progress=False, quiet=True)
 
 

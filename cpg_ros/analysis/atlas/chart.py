@@ -94,7 +94,7 @@ class LossOnCurve:
 
 
 #: Stride of the coarse grid, a power of 2.
-COARSE = 8
+COARSE_STEP = 8
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,8 @@ class Axis:
 
     def indices(self, stride: int) -> list[int]:
         """Return the indices of a grid of a stride: of the coarse grid, halved."""
-        indices, halved = sorted({*range(0, self.count, COARSE), self.count - 1}), COARSE
+        indices = sorted({*range(0, self.count, COARSE_STEP), self.count - 1})
+        halved = COARSE_STEP
         while halved > stride:
             indices = sorted({*indices, *((left + right) // 2
                                           for left, right in pairwise(indices))})
@@ -175,7 +176,7 @@ class ParameterPlane:
 
     def neighbours(self) -> Iterator[tuple[int, tuple[int, int], tuple[int, int]]]:
         """Yield the neighbours on the coarse grid: the axis between them, and both points."""
-        rows, columns = self.first.indices(COARSE), self.second.indices(COARSE)
+        rows, columns = self.first.indices(COARSE_STEP), self.second.indices(COARSE_STEP)
         for row, below in zip(rows, [*rows[1:], None], strict=True):
             for column, beside in zip(columns, [*columns[1:], None], strict=True):
                 if beside is not None:

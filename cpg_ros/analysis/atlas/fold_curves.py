@@ -54,11 +54,11 @@ from scipy.optimize import minimize_scalar
 #: Distances along a branch at which the second fold is searched, and distances of the cusp beyond
 #: the last fold of a curve, in fractions of the first parameter's range.
 CUSP_REACHES = tuple(np.geomspace(0.01, 0.5, 16))
-BEYOND = (0.00125, 0.005, 0.02)
-#: ALONG: tolerance of the extremum along a branch; EXACT: tolerance of the cusp, as a fraction.
-ALONG, EXACT = 1e-7, 1e-13
+CUSP_DISTANCES = (0.00125, 0.005, 0.02)
+#: Of the extremum along a branch, and of the cusp, as a fraction.
+EXTREMUM_TOLERANCE, CUSP_TOLERANCE = 1e-7, 1e-13
 #: Amplitude of the smallest orbits at a cusp.
-SMALLEST = 0.02
+MIN_CUSP_AMPLITUDE = 0.02
 
 
 def cusp_beyond(chart: ParameterPlane, gait: str, fold: CurvePoint, first: float,
@@ -73,12 +73,12 @@ def cusp_beyond(chart: ParameterPlane, gait: str, fold: CurvePoint, first: float
         direction: 1 or -1, in which the curve was followed along the first axis.
 
     """
-    if fold.amplitude < SMALLEST:
+    if fold.amplitude < MIN_CUSP_AMPLITUDE:
         return None
     try:
         reach, sign = _pair(fold)
         base = predict_and_correct(fold, _extremum(fold, reach, sign)[0])
-        if base.amplitude < SMALLEST:
+        if base.amplitude < MIN_CUSP_AMPLITUDE:
             return None
 
         def branch_at(value: float) -> tuple[float, CurvePoint]:
@@ -92,13 +92,13 @@ def cusp_beyond(chart: ParameterPlane, gait: str, fold: CurvePoint, first: float
         def least_rate(branch: tuple[float, CurvePoint]) -> float:
             return _extremum(branch[1], reach, sign)[1]
 
-        for fraction in BEYOND:
+        for fraction in CUSP_DISTANCES:
             far = first + direction * fraction * chart.size[0]
             if far not in chart.first:
                 return None
             if least_rate(branch_at(far)) > 0.0 > least_rate(branch_at(first)):
                 cusp, branch = locate(least_rate, branch_at, min(first, far), max(first, far),
-                                      EXACT * chart.size[0])
+                                      CUSP_TOLERANCE * chart.size[0])
                 middle, residual = _extremum(branch, reach, sign)
                 point = predict_and_correct(branch, middle)
                 if abs(residual) > 1e-6 or abs(middle) > 0.9 * reach:
@@ -128,16 +128,16 @@ def _extremum(point: CurvePoint, reach: float, sign: float) -> tuple[float, floa
     """Return the step from a point that minimises the rate times a sign, and the minimum."""
     rate = rate_along(point)
     extremum = minimize_scalar(lambda step: sign * rate(step), method='bounded',
-                               bounds=(-reach, reach), options={'xatol': ALONG})
+                               bounds=(-reach, reach), options={'xatol': EXTREMUM_TOLERANCE})
     return float(extremum.x), float(extremum.fun)
 
 
 # Curves in two parameters on which the period of a gait's orbits grows without bound.
 
-#: STEP, SHORTEST: longest and shortest step of the first parameter, as fractions of its range.
-STEP, SHORTEST = 1.0 / 24.0, 1.0 / 800.0
+#: Steps of the first parameter, as fractions of its range.
+MAX_STEP, MIN_STEP = 1.0 / 24.0, 1.0 / 800.0
 #: Fractions of the largest period at which the second parameter is solved for, by law.
-FRACTIONS = {'homoclinic': (1.0, 0.95, 0.9), 'SNIC': (1.0, 0.9, 0.8, 0.7)}
+PERIOD_FRACTIONS = {'homoclinic': (1.0, 0.95, 0.9), 'SNIC': (1.0, 0.9, 0.8, 0.7)}
 #: Powers of 1/T in the series of a saddle node.
 POWERS = 0, 2, 3, 4
 #: Rounding error of the second parameter, in fractions of its range.
@@ -164,7 +164,7 @@ def infinite_periods(chart: ParameterPlane, gait: str, branch: Branch,
             np.array([point.value for point in points]),
             np.array([point.orbit.period for point in points]))
         if law:
-            start, fractions = points[-1].curve_point, FRACTIONS[law]
+            start, fractions = points[-1].curve_point, PERIOD_FRACTIONS[law]
             back, ahead = (_continue_long_period(chart, start, first, direction, fractions)
                            for direction in (-1.0, 1.0))
             limit = _limit(chart, start, first, fractions)
@@ -183,8 +183,8 @@ def _continue_long_period(chart: ParameterPlane, point: CurvePoint, first: float
         return limit and (value, limit)
 
     limits: list[tuple[float, float]] = []
-    for value, (limit, _) in continue_steps(advance, (first, (point.value, point)), STEP, SHORTEST,
-                                            STEP):
+    for value, (limit, _) in continue_steps(advance, (first, (point.value, point)), MAX_STEP,
+                                            MIN_STEP, MAX_STEP):
         if limit not in chart.second:
             break
         limits.append((value, limit))
@@ -233,13 +233,13 @@ def _extrapolated(values: np.ndarray, fractions: np.ndarray, rounding: float) ->
     return float(first - (first - second)**2 / bend)
 
 
-#: REACHES: arclengths along a branch within which its fold is searched for, one after another.
-REACHES = (0.01, 0.03, 0.1, 0.3)
+#: Arclengths along a branch within which its fold is searched for, one after another.
+SEARCH_LENGTHS = (0.01, 0.03, 0.1, 0.3)
 #: Amplitude below which an orbit is an equilibrium.
-REST = 5e-3
-#: TRIED: edges of the grid that are tried for a gait; MOST: most points of a branch; SAME:
-#: distance of equal curves, as a fraction of the ranges.
-TRIED, MOST, SAME = 8, 80, 0.02
+MIN_AMPLITUDE = 5e-3
+#: Edges of the grid that are tried for a gait; points of a branch; distance of equal curves, as a
+#: fraction of the ranges.
+MAX_EDGES, MAX_POINTS, CURVE_TOLERANCE = 8, 80, 0.02
 
 
 def edges_without_orbit(chart: ParameterPlane, sheet: GaitMap) -> list[Edge]:
@@ -254,7 +254,7 @@ def fold_curves(job: tuple[ParameterPlane, str, list[Edge]]) -> list[Boundary]:
     """Follow the folds at which a gait is lost on some edges, and its orbits of long period."""
     chart, gait, edges = job
     curves: list[Boundary] = []
-    for edge in edges[::max(1, len(edges) // TRIED)]:
+    for edge in edges[::max(1, len(edges) // MAX_EDGES)]:
         try:
             branch = _branch(chart, gait, edge)
         except (CpgError, np.linalg.LinAlgError):
@@ -271,7 +271,7 @@ def fold_curves(job: tuple[ParameterPlane, str, list[Edge]]) -> list[Boundary]:
 
 def _known(chart: ParameterPlane, curves: list[Boundary], first: float, second: float) -> bool:
     point = chart.fractions_of((first, second))
-    return any(curve.passes(chart, point, SAME) for curve in curves)
+    return any(curve.passes(chart, point, CURVE_TOLERANCE) for curve in curves)
 
 
 def fold_curve(chart: ParameterPlane, gait: str, fold: CurvePoint, first: float) -> Boundary:
@@ -298,7 +298,8 @@ def fold_curve(chart: ParameterPlane, gait: str, fold: CurvePoint, first: float)
 def _branch(chart: ParameterPlane, gait: str, edge: Edge) -> Branch:
     """Return the branch in the row of an edge."""
     orbit = solve_from_wave(chart.at_fractions(edge.start), gait, edge.wave, edge.period)
-    return continue_orbit(orbit, chart.second.line, chart.second.low, chart.second.high, most=MOST)
+    return continue_orbit(orbit, chart.second.line, chart.second.low, chart.second.high,
+                          most=MAX_POINTS)
 
 
 def continue_fold(chart: ParameterPlane, fold: CurvePoint, first: float, direction: float
@@ -327,12 +328,12 @@ def continue_fold(chart: ParameterPlane, fold: CurvePoint, first: float, directi
         ahead = _next(chart, last, new, guess)
         # Beyond a Bautin point branches turn at their Hopf point. A fold off the course is
         # another fold of the branch.
-        if ahead is None or ahead.amplitude < REST or not _on_course(
+        if ahead is None or ahead.amplitude < MIN_AMPLITUDE or not _on_course(
                 chart, [*path[1:][-2:], (new, ahead)], step):
             return None
         return new, ahead
 
-    for point in continue_steps(advance, (first, fold), STEP, SHORTEST, STEP):
+    for point in continue_steps(advance, (first, fold), MAX_STEP, MIN_STEP, MAX_STEP):
         if point[1].value not in chart.second:
             break
         path.append(point)
@@ -358,7 +359,7 @@ def _next(chart: ParameterPlane, fold: CurvePoint, new: float,
         if near is None:
             return None
         rate = rate_along(near)
-        for reach in REACHES:
+        for reach in SEARCH_LENGTHS:
             if rate(-reach) * rate(reach) < 0.0:
                 return locate(lambda point: point.rate, partial(predict_and_correct, near),
                               -reach, reach, 1e-11)
@@ -369,14 +370,13 @@ def _next(chart: ParameterPlane, fold: CurvePoint, new: float,
 
 # The curve of folds of orbits that is born at a Bautin point.
 
-#: BESIDE: distances from the Bautin point, as fractions of the ranges, at which branches start;
-#: AMPLITUDE: of their first orbit; LONGEST: longest step; MOST_POINTS: most points.
-BESIDE, AMPLITUDE, LONGEST, MOST_POINTS = (0.03, 0.06, 0.12), 0.01, 0.05, 80
-#: NEAR: largest distance of a fold from its Hopf point; END: largest distance of the curve's end
-#: from the Bautin point; both as fractions.
-NEAR, END = 0.2, 0.02
+#: Distances from the Bautin point, as fractions of the ranges, at which branches start; amplitude
+#: of their first orbit; steps along them.
+BAUTIN_OFFSETS, FIRST_AMPLITUDE, MAX_ARCLENGTH = (0.03, 0.06, 0.12), 0.01, 0.05
+#: Of a fold from its Hopf point, and of the curve's end from the Bautin point, as fractions.
+MAX_FOLD_DISTANCE, MAX_END_DISTANCE = 0.2, 0.02
 #: Distance of equal curves in fractions.
-SAME_CURVE = 3e-3
+BAUTIN_CURVE_TOLERANCE = 3e-3
 
 
 def bautin_folds(job: tuple[ParameterPlane, Boundary]) -> list[Boundary]:
@@ -402,7 +402,7 @@ def distinct(chart: ParameterPlane, curves: Iterable[Boundary]) -> list[Boundary
         some = fractions[[len(fractions) * k // 4 for k in (1, 2, 3)]]
         if curve.kind != 'fold' or not any(
                 other.kind == 'fold' and other.gaits == curve.gaits
-                and all(other.passes(chart, fraction, SAME_CURVE) for fraction in some)
+                and all(other.passes(chart, fraction, BAUTIN_CURVE_TOLERANCE) for fraction in some)
                 for other in kept):
             kept.append(curve)
     return kept
@@ -421,7 +421,7 @@ def _born(chart: ParameterPlane, point: CodimensionTwo) -> Boundary | None:
         whole = fold_curve(chart, point.gait, fold, first)
         points = whole.points
         gaps = [(np.abs(end - point.values) / chart.size).max() for end in (points[0], points[-1])]
-        if min(gaps) > END:
+        if min(gaps) > MAX_END_DISTANCE:
             continue
         if gaps[1] < gaps[0]:
             points = points[::-1]
@@ -440,7 +440,7 @@ def _folds(condition: HopfCondition, fraction: np.ndarray, tangent: np.ndarray
     """Yield the first folds of branches from Hopf points on both sides, and the first value."""
     chart, mode = condition.chart, condition.mode
     line = chart.second.line
-    for beside in BESIDE:
+    for beside in BAUTIN_OFFSETS:
         for direction in (-1.0, 1.0):
             point = condition.corrected(fraction + direction * beside * tangent, tangent)
             if point is None:
@@ -451,10 +451,10 @@ def _folds(condition: HopfCondition, fraction: np.ndarray, tangent: np.ndarray
             try:
                 hopf = hopf_at(chart.at(first, second), line, mode, float(point[2]))
                 branch = continue_from_hopf(
-                    hopf, line, chart.second.low, chart.second.high, amplitude=AMPLITUDE,
-                    longest_step=LONGEST, most=MOST_POINTS)
+                    hopf, line, chart.second.low, chart.second.high, amplitude=FIRST_AMPLITUDE,
+                    longest_step=MAX_ARCLENGTH, most=MAX_POINTS)
             except (CpgError, np.linalg.LinAlgError):
                 continue
             for fold in branch.folds[:1]:
-                if abs(fold.value - second) < NEAR * chart.size[1]:
+                if abs(fold.value - second) < MAX_FOLD_DISTANCE * chart.size[1]:
                     yield fold.curve_point, first

@@ -25,7 +25,7 @@ from dataclasses import dataclass, field
 import itertools
 from typing import Any
 
-from cpg_ros.analysis.atlas.chart import COARSE, ParameterPlane
+from cpg_ros.analysis.atlas.chart import COARSE_STEP, ParameterPlane
 from cpg_ros.analysis.atlas.hopf_curves import Boundary, ChartLine
 from cpg_ros.analysis.basin import basin
 from cpg_ros.common.errors import CpgError, ShortRepr
@@ -46,16 +46,16 @@ import numpy as np
 #: tell, as a multiplier in its class is 1 to within its error; LOCKED: attracts with a symmetry
 #: lock; STABLE: attracts by itself.
 NONE, UNSTABLE, UNSURE, LOCKED, STABLE = range(5)
-#: KEPT: number of points of a waveform that are kept.
-KEPT = 65
-#: ACCURACY: of multipliers for a map; DOUBTFUL: distance of a leading one from 1 at which all are
-#: computed as in other reports.
-ACCURACY, DOUBTFUL = Accuracy(4, 1e-6, 1e-4, 4), 1e-3
+#: Of a waveform in a file.
+WAVEFORM_POINTS = 65
+#: Of multipliers for a map; distance of a leading one from 1 at which all are computed as in other
+#: reports.
+ACCURACY, NEUTRAL_TOLERANCE = Accuracy(4, 1e-6, 1e-4, 4), 1e-3
 #: Random states from which the basin of an orbit is estimated.
-STARTS = 8
-#: MOST: most points of a branch from a Hopf point; TRIED: most nearby orbits that are continued to
-#: a point; STEPS: numbers of steps in which this is tried.
-MOST, TRIED, STEPS = 60, 3, (1, 4)
+NUM_STATES = 8
+#: Points of a branch from a Hopf point; nearby orbits that are continued to a point; numbers of
+#: steps in which this is tried.
+MAX_POINTS, MAX_NEARBY, NUM_STEPS = 60, 3, (1, 4)
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,7 @@ class _Finder:
             orbit, assessed = best
             point_data |= assessed | {'wave': _wave(orbit)}
             if self.row.basin:
-                point_data['basin'] = basin(orbit, STARTS, gain=point_data['lock']).fraction
+                point_data['basin'] = basin(orbit, NUM_STATES, gain=point_data['lock']).fraction
         return point_data
 
     def _orbits(self, network: Network, column: int, value: float) -> Iterator[Orbit]:
@@ -130,7 +130,7 @@ class _Finder:
             with suppress(NoOrbit):
                 yield from _proper(solve_beside(network, self.last))
         for near in sorted(self.row.near, key=lambda point: (
-                abs(point[0] - self.row.row) + abs(point[1] - column), point[:2]))[:TRIED]:
+                abs(point[0] - self.row.row) + abs(point[1] - column), point[:2]))[:MAX_NEARBY]:
             try:
                 yield from _proper(self._continued(near, value))
             except NoOrbit:
@@ -157,7 +157,7 @@ class _Finder:
         begin = np.array([chart.first.values[row], chart.second.values[column]])
         end = np.array([self.first, value])
         orbit = solve_from_wave(chart.at(*map(float, begin)), self.row.gait, wave, period)
-        for steps in STEPS:
+        for steps in NUM_STEPS:
             ahead = orbit
             try:
                 for k in range(1, steps + 1):
@@ -165,7 +165,7 @@ class _Finder:
                                          ahead)
                 return ahead
             except NoOrbit:
-                if steps == STEPS[-1]:
+                if steps == NUM_STEPS[-1]:
                     raise
         return orbit
 
@@ -187,7 +187,8 @@ class _Finder:
                 low, high = ((0.9 * point.value, axis.high) if point.normal_form.side >= 0
                              else (axis.low, 1.1 * point.value))
                 try:
-                    self._branches.append(continue_from_hopf(point, line, low, high, most=MOST))
+                    self._branches.append(continue_from_hopf(point, line, low, high,
+                                                             most=MAX_POINTS))
                 except CpgError:
                     continue
         return self._branches
@@ -196,7 +197,7 @@ class _Finder:
 def _assess(orbit: Orbit) -> dict[str, Any]:
     """Return the stability of an orbit, and its numbers."""
     spectrum = multipliers(orbit, accuracy=ACCURACY)
-    if any(abs(modulus - 1.0) < DOUBTFUL for modulus in (spectrum.leading_within,
+    if any(abs(modulus - 1.0) < NEUTRAL_TOLERANCE for modulus in (spectrum.leading_within,
                                                          spectrum.leading_transverse)):
         spectrum = multipliers(orbit)
     return {'label': STABLE if spectrum.attracts else {
@@ -215,7 +216,7 @@ def _proper(orbit: Orbit) -> Iterator[Orbit]:
 
 def _wave(orbit: Orbit) -> list[list[float]]:
     """Return the states at an odd number of even times of a cycle."""
-    return np.round(orbit.cycle(KEPT), 5).tolist()
+    return np.round(orbit.cycle(WAVEFORM_POINTS), 5).tolist()
 
 
 def solve_from_wave(network: Network, gait: str, wave: list[list[float]], period: float) -> Orbit:
@@ -234,8 +235,8 @@ def solve_from_wave(network: Network, gait: str, wave: list[list[float]], period
 
 
 #: Orbits from which a point is reached, and numbers of a point.
-CLOSE = 2
-NUMBERS = ('period', 'amplitude', 'leading', 'leading_within', 'unstable', 'lock', 'basin')
+NUM_CORNERS = 2
+QUANTITIES = ('period', 'amplitude', 'leading', 'leading_within', 'unstable', 'lock', 'basin')
 
 
 @dataclass(eq=False, repr=False)
@@ -260,7 +261,7 @@ class GaitMap(ShortRepr):
     def __post_init__(self) -> None:
         self.label = np.full(self.shape, -1)
         self.computed = np.zeros(self.shape, dtype=bool)
-        self.numbers = {name: np.full(self.shape, np.nan) for name in NUMBERS}
+        self.numbers = {name: np.full(self.shape, np.nan) for name in QUANTITIES}
 
     def add_points(self, points: Iterable[dict[str, Any]]) -> None:
         """Enter the points of a job where they are better than previous ones."""
@@ -269,7 +270,7 @@ class GaitMap(ShortRepr):
             if self.computed[at] and point['label'] <= self.label[at]:
                 continue
             self.label[at], self.computed[at] = point['label'], True
-            for name in NUMBERS:
+            for name in QUANTITIES:
                 if point.get(name) is not None:
                     self.numbers[name][at] = point[name]
             if 'wave' in point:
@@ -285,12 +286,12 @@ class GaitMap(ShortRepr):
 def coarse_rows(chart: ParameterPlane, gaits: tuple[str, ...],
                 curves: Iterable[Boundary]) -> Iterator[AtlasRow]:
     """Yield the jobs of the coarse grid, and of rows through Hopf curves between its own rows."""
-    columns = tuple(chart.second.indices(COARSE))
-    rows = {gait: set(chart.first.indices(COARSE)) for gait in gaits}
+    columns = tuple(chart.second.indices(COARSE_STEP))
+    rows = {gait: set(chart.first.indices(COARSE_STEP)) for gait in gaits}
     for curve in curves:
         low, high = np.interp([curve.points[:, 0].min(), curve.points[:, 0].max()],
                               chart.first.values, np.arange(chart.first.count))
-        if high - low < 2 * COARSE:
+        if high - low < 2 * COARSE_STEP:
             for gait in curve.gaits:
                 rows[gait].add(round(0.5 * (low + high)))
     for row in sorted(set().union(*rows.values())):
@@ -314,11 +315,11 @@ def worse_points(chart: ParameterPlane, gait: str, sheet: GaitMap,
     """
     jobs = []
     new = [at for at in sheet.waves if sheet.label[at] != before[at]]
-    for row in chart.first.indices(COARSE):
+    for row in chart.first.indices(COARSE_STEP):
         columns: list[int] = []
         near: set[tuple[int, int]] = set()
-        for column in chart.second.indices(COARSE):
-            close = {at for at in new if max(abs(at[0] - row), abs(at[1] - column)) <= COARSE
+        for column in chart.second.indices(COARSE_STEP):
+            close = {at for at in new if max(abs(at[0] - row), abs(at[1] - column)) <= COARSE_STEP
                      and sheet.label[at] > sheet.label[row, column]}
             if close:
                 columns.append(column)
@@ -395,7 +396,7 @@ def _near(sheet: GaitMap, row: int, columns: list[int], stride: int
         close = sorted((abs(r - row) + abs(c - column), r, c)
                        for r in range(max(0, row - stride), row + stride + 1)
                        for c in range(max(0, column - stride), column + stride + 1)
-                       if (r, c) in sheet.waves)[:CLOSE]
+                       if (r, c) in sheet.waves)[:NUM_CORNERS]
         for _, r, c in close:
             if (r, c) not in seen:
                 seen.add((r, c))
@@ -419,11 +420,11 @@ def refine(chart: ParameterPlane, gaits: tuple[str, ...], curves: Iterable[Bound
     sheets = {gait: GaitMap((chart.first.count, chart.second.count)) for gait in gaits}
     jobs: list[AtlasRow] = list(coarse_rows(chart, gaits, curves))
     before = {gait: np.full_like(sheet.label, -1) for gait, sheet in sheets.items()}
-    stride = COARSE
+    stride = COARSE_STEP
     while True:
         for row, points in run(jobs, len(jobs)):
             sheets[row.gait].add_points(points)
-        if stride == COARSE:
+        if stride == COARSE_STEP:
             jobs = [job for gait in gaits for job in worse_points(chart, gait, sheets[gait],
                                                                   before[gait])]
             before = {gait: sheet.label.copy() for gait, sheet in sheets.items()}

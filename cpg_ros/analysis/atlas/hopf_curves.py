@@ -36,22 +36,15 @@ from cpg_ros.common.errors import CpgError, ShortRepr
 from cpg_ros.dynamics import arclength
 from cpg_ros.dynamics.characteristic import characteristic_matrix
 from cpg_ros.dynamics.equilibrium import equilibrium, odd, Quotient
-from cpg_ros.dynamics.hopf import (
-    AXIS_TOLERANCE,
-    hopf_points,
-    HopfPoint,
-    NUM_EXTRA_ROOTS,
-    tracked_roots,
-)
+from cpg_ros.dynamics.hopf import AXIS_TOLERANCE, hopf_points, HopfPoint, NUM_SPARE, tracked_roots
 from cpg_ros.dynamics.isotypic import Block, block_at, block_of, blocks, classes, Expansion
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 
 # The equations of a Hopf point in two parameters, and Newton's method for them.
 
-#: Newton's method. NEWTON: most steps; EXACT: tolerance; DIFFERENCE: step of finite differences,
-#: all as fractions of the ranges.
-NEWTON, EXACT, DIFFERENCE = 12, 1e-12, 1e-6
+#: Tolerance and differences of Newton's method are fractions of the ranges.
+NEWTON_ITERATIONS, NEWTON_TOLERANCE, DIFFERENCE_STEP = 12, 1e-12, 1e-6
 
 
 class HopfCondition:
@@ -71,14 +64,15 @@ class HopfCondition:
 
     def tangent(self, fraction: np.ndarray) -> np.ndarray:
         """Return the unit tangent of the curve, either way, shape (3,)."""
-        return np.linalg.svd(arclength.derivatives(self.values, fraction, DIFFERENCE))[2][-1]
+        return np.linalg.svd(arclength.derivatives(self.values, fraction, DIFFERENCE_STEP))[2][-1]
 
     def corrected(self, guess: np.ndarray, tangent: np.ndarray) -> np.ndarray | None:
         """Solve in the plane normal to a tangent; None where Newton's method is lost."""
         try:
             return arclength.newton(
                 lambda fraction: np.append(self.values(fraction), tangent @ (fraction - guess)),
-                guess, steps=NEWTON, tolerance=EXACT, difference=DIFFERENCE, longest=0.5)
+                guess, steps=NEWTON_ITERATIONS, tolerance=NEWTON_TOLERANCE,
+                difference=DIFFERENCE_STEP, longest=0.5)
         except (np.linalg.LinAlgError, CpgError, ArithmeticError):
             return None
 
@@ -99,7 +93,7 @@ def condition_of(chart: ParameterPlane, gait: str, fraction: np.ndarray) -> Hopf
 
 
 #: Lines along each axis on which the starts of curves are searched.
-LINES = 41
+NUM_LINES = 41
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -148,7 +142,7 @@ def lines_across(chart: ParameterPlane, gaits: tuple[str, ...]) -> Iterator[Char
     """Yield evenly spaced lines along both axes: lines along one may all miss a curve."""
     axes = chart.first, chart.second
     for along, across in ((1, 0), (0, 1)):
-        for fixed in np.linspace(axes[across].low, axes[across].high, LINES):
+        for fixed in np.linspace(axes[across].low, axes[across].high, NUM_LINES):
             yield ChartLine(chart, gaits, along, float(fixed), axes[along].low, axes[along].high)
 
 
@@ -173,11 +167,11 @@ def hopf_starts(segment: ChartLine) -> list[HopfStart]:
     return starts
 
 
-#: FIRST, LONGEST, SHORTEST: steps along a curve, as fractions of the ranges; MOST: most points.
-FIRST, LONGEST, SHORTEST, MOST = 0.01, 0.04, 1e-5, 400
-#: SAME: distance, as a fraction of the ranges, up to which a start lies on a known curve. Two
-#: classes share a curve if CHECKED points on it are solutions of both to SHARED.
-SAME, SHARED, CHECKED = 5e-3, 1e-8, 8
+#: Steps along a curve, as fractions of the ranges; points of it.
+FIRST_STEP, MAX_STEP, MIN_STEP, MAX_POINTS = 0.01, 0.04, 1e-5, 400
+#: Distance, as a fraction of the ranges, up to which a start lies on a known curve. Two classes
+#: share a curve if SHARED_POINTS points on it are solutions of both to SHARED_TOLERANCE.
+CURVE_TOLERANCE, SHARED_TOLERANCE, SHARED_POINTS = 5e-3, 1e-8, 8
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -223,8 +217,8 @@ def _continue_hopf(condition: HopfCondition, start: np.ndarray, direction: float
         return (None if point is None or not _inside(point) else (point, condition.tangent(point)))
 
     return [*arclength.continue_along_tangents(
-        correct, start, direction * condition.tangent(start), (FIRST, SHORTEST, LONGEST),
-        aligned=0.95, most=MOST)]
+        correct, start, direction * condition.tangent(start), (FIRST_STEP, MIN_STEP, MAX_STEP),
+        aligned=0.95, most=MAX_POINTS)]
 
 
 @dataclass(eq=False)
@@ -236,13 +230,13 @@ class _HopfCurve:
     def holds(self, chart: ParameterPlane, start: HopfStart) -> bool:
         """Whether a point lies on the curve, and its class shares all of the curve."""
         scale = np.array([1.0, 1.0, max(1.0, abs(start.fraction[2]))])
-        if not arclength.on_curve(self.fractions / scale, start.fraction / scale, SAME):
+        if not arclength.on_curve(self.fractions / scale, start.fraction / scale, CURVE_TOLERANCE):
             return False
         if start.mode not in self.modes:
             condition = HopfCondition(chart, start.mode)
-            for fraction in self.fractions[::max(1, len(self.fractions) // CHECKED)]:
+            for fraction in self.fractions[::max(1, len(self.fractions) // SHARED_POINTS)]:
                 exact = condition.corrected(fraction, condition.tangent(fraction))
-                if exact is None or np.abs(exact - fraction).max() > SHARED:
+                if exact is None or np.abs(exact - fraction).max() > SHARED_TOLERANCE:
                     return False
             self.modes.add(start.mode)
         if start.gait not in self.gaits:
@@ -283,12 +277,11 @@ def hopf_curves(chart: ParameterPlane, gaits: tuple[str, ...],
 # Bogdanov-Takens and zero-Hopf points, in which a curve of Hopf points ends inside the plane.
 
 #: Largest distance of a curve's end from its last point, in fractions of the ranges.
-REACH = 0.03
-#: END_NEWTON: most steps of Newton's method at the end of a curve; RESIDUAL: largest residual
-#: there.
-END_NEWTON, RESIDUAL = 30, 1e-9
+MAX_END_DISTANCE = 0.03
+#: Of Newton's method at the end of a curve.
+END_ITERATIONS, MAX_RESIDUAL = 30, 1e-9
 #: Imaginary part of the root at which the derivative of a real determinant is taken.
-SLIGHT = 1e-6
+IMAGINARY_STEP = 1e-6
 
 Equations = Callable[[np.ndarray], np.ndarray]
 
@@ -318,7 +311,7 @@ class _End:
         rates, expansion = self._split(unknowns)
         block = block_of(expansion, self.symmetry)
         return np.array([*rates, _determinant(block, 0.0).real,
-                         _determinant(block, 1j * SLIGHT).imag / SLIGHT])
+                         _determinant(block, 1j * IMAGINARY_STEP).imag / IMAGINARY_STEP])
 
     def zero_hopf(self, unknowns: np.ndarray) -> np.ndarray:
         """Equations of a zero-Hopf point in (state, p1, p2, omega)."""
@@ -336,12 +329,12 @@ def _determinant(block: Block, root: complex) -> complex:
 def _solved(equations: Equations, start: np.ndarray) -> tuple[np.ndarray, float] | None:
     """Apply Newton's method; return the solution and its largest residual, or None."""
     try:
-        solution = arclength.newton(equations, start, steps=END_NEWTON, tolerance=EXACT,
-                          difference=DIFFERENCE, longest=1.0)
+        solution = arclength.newton(equations, start, steps=END_ITERATIONS, longest=1.0,
+                                    tolerance=NEWTON_TOLERANCE, difference=DIFFERENCE_STEP)
         residual = math.inf if solution is None else float(np.abs(equations(solution)).max())
     except (np.linalg.LinAlgError, CpgError, ArithmeticError):
         return None
-    return None if solution is None or not residual < RESIDUAL else (solution, residual)
+    return None if solution is None or not residual < MAX_RESIDUAL else (solution, residual)
 
 
 def curve_ends(chart: ParameterPlane, gait: str, mode: tuple[int, ...], fractions: np.ndarray
@@ -381,19 +374,19 @@ def curve_ends(chart: ParameterPlane, gait: str, mode: tuple[int, ...], fraction
 def _here(fraction: np.ndarray, last: np.ndarray) -> bool:
     """Return whether a solution lies in the plane, close to the end of the curve."""
     return bool((fraction >= -1e-9).all() and (fraction <= 1.0 + 1e-9).all()
-                and np.abs(fraction - last[:2]).max() < REACH)
+                and np.abs(fraction - last[:2]).max() < MAX_END_DISTANCE)
 
 
 #: Tolerance of a zero, as a fraction of the way between two points of a curve.
-BRACKET = 1e-14
+ZERO_TOLERANCE = 1e-14
 #: Size of a test function at a zero, relative to its neighbours; at a pole it is larger.
-VANISHED = 1e-5
+MAX_ZERO_RATIO = 1e-5
 #: Rounding error of a Lyapunov coefficient, relative to the curve's largest.
 ROUNDING = 1e-9
 #: Difference of equal points in fractions of the ranges, and of equal frequencies.
-SAME_POINT = 1e-7
+POINT_TOLERANCE = 1e-7
 #: Imaginary part of a real root, over omega.
-REAL = 1e-6
+REAL_ROOT_TOLERANCE = 1e-6
 
 Test = Callable[[np.ndarray], float]
 
@@ -446,10 +439,11 @@ class _Curve:
             if not left * right < 0.0:
                 continue
             try:
-                zero = arclength.locate(test, partial(self.between, start, end), 0.0, 1.0, BRACKET)
+                zero = arclength.locate(test, partial(self.between, start, end), 0.0, 1.0,
+                                        ZERO_TOLERANCE)
             except (ArithmeticError, ValueError, CpgError):
                 continue
-            if abs(test(zero)) < VANISHED * min(abs(left), abs(right)):
+            if abs(test(zero)) < MAX_ZERO_RATIO * min(abs(left), abs(right)):
                 yield zero
 
 
@@ -506,7 +500,7 @@ def _other_roots(curve: _Curve, gait: str) -> list[CodimensionTwo]:
     small = AXIS_TOLERANCE * float(curve.fractions[:, 2].max())
     points = [curve.at(fraction) for fraction in curve.fractions]
     for which in range(len(points[0][1])):
-        count = tracked_roots([split[which] for _, split in points], NUM_EXTRA_ROOTS + 2)
+        count = tracked_roots([split[which] for _, split in points], NUM_SPARE + 2)
 
         def others(fraction: np.ndarray, which: int = which, count: int = count) -> np.ndarray:
             point, split = curve.at(fraction)
@@ -519,7 +513,7 @@ def _other_roots(curve: _Curve, gait: str) -> list[CodimensionTwo]:
             for zero in curve.zeros(test, small):
                 block, root = curve.at(zero)[1][which], complex(others(zero)[rank])
                 # Of a pair in two conjugate classes, the root with positive imaginary part.
-                if root.imag > -REAL * zero[2] or block.real:
+                if root.imag > -REAL_ROOT_TOLERANCE * zero[2] or block.real:
                     _enter(crossings, _crossing(curve, gait, zero, block, root), curve.chart)
     return crossings
 
@@ -527,7 +521,7 @@ def _other_roots(curve: _Curve, gait: str) -> list[CodimensionTwo]:
 def _crossing(curve: _Curve, gait: str, zero: np.ndarray, block: Block, root: complex
               ) -> CodimensionTwo:
     kind, omega = 'Hopf-Hopf', abs(root.imag)
-    if omega < REAL * zero[2]:
+    if omega < REAL_ROOT_TOLERANCE * zero[2]:
         kind, omega = 'zero-Hopf', 0.0
     return CodimensionTwo(kind, gait, curve.chart.values_at(zero[:2]), root.real,
                           float(zero[2]), (block.gait,), omega)
@@ -537,9 +531,9 @@ def _enter(points: list[CodimensionTwo], new: CodimensionTwo, chart: ParameterPl
     """Enter a point, or add its classes to an equal point."""
     for k, point in enumerate(points):
         gap = np.abs(np.subtract(point.values, new.values) / chart.size).max()
-        if (point.kind == new.kind and gap < SAME_POINT
-                and np.isclose(point.other_omega, new.other_omega, rtol=SAME_POINT,
-                               atol=SAME_POINT)):
+        if (point.kind == new.kind and gap < POINT_TOLERANCE
+                and np.isclose(point.other_omega, new.other_omega, rtol=POINT_TOLERANCE,
+                               atol=POINT_TOLERANCE)):
             points[k] = replace(point, other=tuple(dict.fromkeys((*point.other, *new.other))))
             return
     points.append(new)

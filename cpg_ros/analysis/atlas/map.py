@@ -25,7 +25,7 @@ from string import Template
 from typing import Any
 
 from cpg_ros.analysis.atlas.chart import CodimensionTwo, LABELS, LossOnCurve, ParameterPlane
-from cpg_ros.analysis.atlas.grid import AtlasRow, GaitMap, NUMBERS
+from cpg_ros.analysis.atlas.grid import AtlasRow, GaitMap, QUANTITIES
 from cpg_ros.analysis.atlas.hopf_curves import Boundary
 from cpg_ros.common.errors import InputError
 from cpg_ros.common.files import replacing, stored_json, write_atomically
@@ -36,15 +36,16 @@ import numpy as np
 
 # An atlas as a picture: a panel for each gait, and the exact boundaries on top.
 
-#: STATES: label of a point -> its colour; LINES: kind of curve -> its colour and style.
-STATES = {'no orbit': '#f1f3f5', 'unstable in its class': '#f4c7a1',
-          'cannot tell': '#ced4da', 'attracts with a lock': '#b9d6f2',
-          'attracts by itself': '#2b6cb0'}
-LINES = {'Hopf': ('#1a202c', '-'), 'torus': ('#c53030', '-'), 'branch point': ('#b7791f', '-'),
-         'period doubling': ('#276749', '-'), 'fold': ('#6b46c1', '--'),
-         'homoclinic': ('#2c7a7b', ':'), 'SNIC': ('#2c7a7b', '-.')}
-#: TOGETHER: distance, as a fraction of the ranges, up to which points have one marker.
-TOGETHER = 2e-3
+#: Label of a point -> its colour; kind of a curve -> its colour and style.
+STATE_COLOURS = {
+    'no orbit': '#f1f3f5', 'unstable in its class': '#f4c7a1', 'cannot tell': '#ced4da',
+    'attracts with a lock': '#b9d6f2', 'attracts by itself': '#2b6cb0'}
+LINE_STYLES = {
+    'Hopf': ('#1a202c', '-'), 'torus': ('#c53030', '-'), 'branch point': ('#b7791f', '-'),
+    'period doubling': ('#276749', '-'), 'fold': ('#6b46c1', '--'),
+    'homoclinic': ('#2c7a7b', ':'), 'SNIC': ('#2c7a7b', '-.')}
+#: Distance, as a fraction of the ranges, up to which points have one marker.
+MARKER_DISTANCE = 2e-3
 
 
 def markers(chart: ParameterPlane, curves: list[Boundary], gait: str
@@ -57,7 +58,7 @@ def markers(chart: ParameterPlane, curves: list[Boundary], gait: str
         label = LABELS[point.kind]
         near = next((labels for position, labels in placed
                      if (np.abs(np.subtract(position, point.values)) / chart.size).max()
-                     < TOGETHER), None)
+                     < MARKER_DISTANCE), None)
         if near is None:
             placed.append((point.values, [label]))
         elif label not in near:
@@ -88,10 +89,11 @@ def draw_map(path: Path, chart: ParameterPlane, sheets: dict[str, GaitMap],
               chart.second.low - half[1], chart.second.high + half[1])
     for panel, (gait, sheet) in zip(panels, sheets.items(), strict=False):
         panel.imshow(sheet.label.T, origin='lower', extent=extent, aspect='auto', vmin=-0.5,
-                     vmax=4.5, cmap=ListedColormap(list(STATES.values())), interpolation='nearest')
+                     vmax=4.5, cmap=ListedColormap(list(STATE_COLOURS.values())),
+                     interpolation='nearest')
         for curve in curves:
             if gait in curve.gaits:
-                colour, style = LINES[curve.kind]
+                colour, style = LINE_STYLES[curve.kind]
                 panel.plot(curve.points[:, 0], curve.points[:, 1], style, color=colour, lw=1.1)
         for position, labels in markers(chart, curves, gait):
             panel.plot(*position, 'o', ms=4.5, mfc='#ffffff', mec='#1a202c', mew=1.0, zorder=4)
@@ -112,13 +114,13 @@ def draw_map(path: Path, chart: ParameterPlane, sheets: dict[str, GaitMap],
         panel.xaxis.set_tick_params(labelbottom=True)
         panel.set_xlabel(str(chart.first.line))
     figure.supylabel(str(chart.second.line))
-    kinds = [kind for kind in LINES if any(curve.kind == kind for curve in curves)]
+    kinds = [kind for kind in LINE_STYLES if any(curve.kind == kind for curve in curves)]
     met = {point.kind for curve in curves for point in curve.codimension_two
            if point.gait in sheets}
     special = [kind for kind in LABELS if kind in met]
     figure.legend(handles=[
-        *(Patch(color=colour, label=text) for text, colour in STATES.items()),
-        *(Line2D([], [], color=LINES[kind][0], ls=LINES[kind][1], label=kind)
+        *(Patch(color=colour, label=text) for text, colour in STATE_COLOURS.items()),
+        *(Line2D([], [], color=LINE_STYLES[kind][0], ls=LINE_STYLES[kind][1], label=kind)
           for kind in kinds),
         *(Line2D([], [], ls='', marker='o', ms=4.5, mfc='#ffffff', mec='#1a202c',
                  label=f'{LABELS[kind]} {kind}') for kind in special)],
@@ -128,8 +130,8 @@ def draw_map(path: Path, chart: ParameterPlane, sheets: dict[str, GaitMap],
 
 # An atlas on disk: parts as they are finished, then atlas.parquet and boundaries.json.
 
-#: MARK: file that marks a folder with an atlas; PARTS: folder of its finished parts.
-MARK, PARTS = 'atlas.json', 'parts'
+#: ATLAS_FILE: file that marks a folder with an atlas; PARTS_FOLDER: folder of its finished parts.
+ATLAS_FILE, PARTS_FOLDER = 'atlas.json', 'parts'
 LABEL_NAMES = ('none', 'unstable', 'cannot tell', 'with lock', 'stable')
 
 
@@ -146,18 +148,19 @@ class AtlasFolder:
         """
         self.folder, self.chart, self.gaits = folder, chart, gaits
         text = json.dumps({**chart.as_dict(), 'gaits': gaits}, indent=1)
-        mark = folder / MARK
+        mark = folder / ATLAS_FILE
         if mark.exists():
             if mark.read_text() != text:
                 raise InputError(f'{folder} holds an atlas of other parameters or gaits')
         elif folder.exists() and any(folder.iterdir()):
             raise InputError(f'{folder} is not the folder of an atlas: it contains other files')
-        (folder / PARTS).mkdir(parents=True, exist_ok=True)
+        (folder / PARTS_FOLDER).mkdir(parents=True, exist_ok=True)
         write_atomically(mark, text)
 
     def _place(self, row: AtlasRow) -> Path:
         text = json.dumps([LABEL_NAMES, row.gait, row.row, row.columns, row.near, row.basin])
-        return self.folder / PARTS / f'{hashlib.sha256(text.encode()).hexdigest()[:20]}.json'
+        return (self.folder / PARTS_FOLDER
+                / f'{hashlib.sha256(text.encode()).hexdigest()[:20]}.json')
 
     def get(self, row: AtlasRow) -> list[dict[str, Any]] | None:
         """Return the points of a job, if it is done."""
@@ -216,13 +219,12 @@ def columns(chart: ParameterPlane, sheets: dict[str, GaitMap]) -> Iterator[dict[
         yield {'gait': np.repeat(gait, label.size), str(chart.first.line): first.ravel(),
                str(chart.second.line): second.ravel(), 'exists': label > 0,
                'state': np.array(LABEL_NAMES)[label], 'computed': sheet.computed.ravel(),
-               **{name: sheet.numbers[name].ravel() for name in NUMBERS}}
+               **{name: sheet.numbers[name].ravel() for name in QUANTITIES}}
 
 
-#: POINTS: points of a waveform on the page; APART: distance on the grid between two waveforms.
-POINTS, APART = 32, 4
-#: SHOWN: numbers of a point that the page shows.
-SHOWN = ('period', 'amplitude', 'leading', 'lock', 'basin')
+#: Points of a waveform on the page; distance on the grid between two waveforms.
+WAVEFORM_POINTS, WAVEFORM_SPACING = 32, 4
+PAGE_QUANTITIES = ('period', 'amplitude', 'leading', 'lock', 'basin')
 
 
 def _packed(values: np.ndarray) -> str:
@@ -233,12 +235,12 @@ def _waves(sheet: GaitMap, cells: int) -> list[Any]:
     """Row, column and cells over a cycle, of some points of the grid."""
     waves, seen = [], set()
     for (row, column), (wave, _) in sorted(sheet.waves.items()):
-        tile = row // APART, column // APART
+        tile = row // WAVEFORM_SPACING, column // WAVEFORM_SPACING
         if tile in seen:
             continue
         seen.add(tile)
         x = np.array(wave)[:, :cells]
-        some = x[::max(1, len(x) // POINTS)]
+        some = x[::max(1, len(x) // WAVEFORM_POINTS)]
         waves.append([row, column, np.round(some - x.mean(axis=0), 3).T.tolist()])
     return waves
 
@@ -259,25 +261,25 @@ def write_page(path: Path, chart: ParameterPlane, sheets: dict[str, GaitMap],
         'names': [str(axis.line) for axis in axes], 'low': [axis.low for axis in axes],
         'high': [axis.high for axis in axes], 'counts': [axis.count for axis in axes],
         'lines_of': [list(zip(axis.line.names, axis.line.signs, strict=True)) for axis in axes],
-        'base': chart.base, 'shown': SHOWN,
-        'states': list(STATES), 'colours': list(STATES.values()),
-        'lines': {name: line[0] for name, line in LINES.items()},
+        'base': chart.base, 'shown': PAGE_QUANTITIES,
+        'states': list(STATE_COLOURS), 'colours': list(STATE_COLOURS.values()),
+        'lines': {name: line[0] for name, line in LINE_STYLES.items()},
         'legs': [[leg, cells[0] - 1] for leg, cells in legs.items()],
         'curves': [{'kind': boundary.kind, 'gaits': boundary.gaits,
                     'points': np.round(boundary.points[:, :2], 5).tolist()}
                    for boundary in curves],
         'gaits': {gait: {
             'label': _packed(sheet.label.astype(np.uint8)),
-            **{name: _packed(sheet.numbers[name].astype(np.float32)) for name in SHOWN},
+            **{name: _packed(sheet.numbers[name].astype(np.float32)) for name in PAGE_QUANTITIES},
             'special': [[*position, ' '.join(labels)]
                         for position, labels in markers(chart, curves, gait)],
             'waves': _waves(sheet, max(max(cells) for cells in legs.values()))}
             for gait, sheet in sheets.items()}}
     data = json.dumps(atlas).replace('<', '\\u003c')
     kinds = {curve.kind for curve in curves}
-    met = {kind: colour for kind, (colour, _) in LINES.items() if kind in kinds}
+    met = {kind: colour for kind, (colour, _) in LINE_STYLES.items() if kind in kinds}
     key = ''.join(f'<span style="background:{colour}"></span>{text}'
-                  for text, colour in (STATES | met).items())
+                  for text, colour in (STATE_COLOURS | met).items())
     listed = ''.join(
         f'<tr><td>{LABELS[point.kind]}</td><td>{point}</td></tr>'
         for point in {str(point): point for curve in curves

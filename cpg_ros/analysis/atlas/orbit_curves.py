@@ -69,7 +69,7 @@ class OrbitPlane:
 
 
 #: Points on a curve at which the normal form is computed.
-POINTS = 5
+NUM_FORMS = 5
 
 
 def stability_losses(plane: OrbitPlane, part: int, rank: int,
@@ -86,7 +86,7 @@ def stability_losses(plane: OrbitPlane, part: int, rank: int,
         curve: its points in fractions of the ranges, and orbits beside them.
 
     """
-    indices = np.unique(((np.arange(POINTS) + 0.5) / POINTS * len(curve)).astype(int))
+    indices = np.unique(((np.arange(NUM_FORMS) + 0.5) / NUM_FORMS * len(curve)).astype(int))
     for fraction, beside in (curve[k] for k in indices):
         plane.last = beside
         try:
@@ -101,16 +101,15 @@ def stability_losses(plane: OrbitPlane, part: int, rank: int,
 
 # Strong resonances on a curve of torus points: 1:1 to 1:4.
 
-#: SUMS: n of the resonance 1:n -> sum of the two multipliers, 2 cos(2 pi / n).
-SUMS = {1: 2.0, 2: -2.0, 3: -1.0, 4: 0.0}
-#: Newton's method: steps, tolerance and differences in fractions.
-RESONANCE_STEPS, RESONANCE_TOLERANCE, RESONANCE_DIFFERENCE = 12, 1e-10, 1e-5
-#: REACH: largest distance of a resonance from a point of the curve, as a fraction; CLOSE:
-#: difference of the multipliers' sum from SUMS within which an end of the curve is tried.
-REACH, CLOSE = 0.08, 0.5
-#: RESIDUAL: largest residual of the multipliers' product and sum; SAME: distance of equal
-#: resonances.
-RESIDUAL, SAME = 1e-8, 1e-5
+#: n of the resonance 1:n -> sum of the two multipliers, 2 cos(2 pi / n).
+RESONANCE_SUMS = {1: 2.0, 2: -2.0, 3: -1.0, 4: 0.0}
+#: Of Newton's method, in fractions.
+RESONANCE_ITERATIONS, RESONANCE_TOLERANCE, RESONANCE_DIFFERENCE = 12, 1e-10, 1e-5
+#: Distance of a resonance from a point of the curve, as a fraction; difference of the multipliers'
+#: sum from RESONANCE_SUMS within which an end of the curve is tried.
+MAX_RESONANCE_DISTANCE, SUM_TOLERANCE = 0.08, 0.5
+#: Residual of the multipliers' product and sum; distance of equal resonances.
+MAX_RESIDUAL, POINT_TOLERANCE = 1e-8, 1e-5
 
 
 def resonances(plane: OrbitPlane, part: int, rank: int, fractions: Sequence[np.ndarray]
@@ -128,9 +127,9 @@ def resonances(plane: OrbitPlane, part: int, rank: int, fractions: Sequence[np.n
     for guess, n, orbit in [*_candidates(plane, part, rank, fractions)]:
         plane.last = orbit
         fraction, residual = _solved(plane, part, n, guess) or (guess, np.inf)
-        if (residual < RESIDUAL and np.abs(fraction - guess).max() < REACH
+        if (residual < MAX_RESIDUAL and np.abs(fraction - guess).max() < MAX_RESONANCE_DISTANCE
                 and (fraction >= 0.0).all() and (fraction <= 1.0).all()
-                and not any(np.abs(fraction - point).max() < SAME for point in points)):
+                and not any(np.abs(fraction - point).max() < POINT_TOLERANCE for point in points)):
             points.append(fraction)
             yield CodimensionTwo(f'1:{n} resonance', plane.gait, plane.chart.values_at(fraction),
                                  residual)
@@ -149,7 +148,7 @@ def _candidates(plane: OrbitPlane, part: int, rank: int, fractions: Sequence[np.
     for (start, left, orbit), (end, right, _) in pairwise(along):
         complexes = [abs(mu.imag) > IMAGINARY_TOLERANCE for mu in (left, right)]
         for n in (3, 4):
-            gaps = [2.0 * mu.real - SUMS[n] for mu in (left, right)]
+            gaps = [2.0 * mu.real - RESONANCE_SUMS[n] for mu in (left, right)]
             if all(complexes) and gaps[0] * gaps[1] <= 0.0 and gaps[0] != gaps[1]:
                 yield start + gaps[0] / (gaps[0] - gaps[1]) * (end - start), n, orbit
         if complexes == [True, False]:
@@ -159,7 +158,7 @@ def _candidates(plane: OrbitPlane, part: int, rank: int, fractions: Sequence[np.
     if along and abs(along[-1][1].imag) > IMAGINARY_TOLERANCE:
         last, mu, orbit = along[-1]
         for n in (1, 2):
-            if abs(2.0 * mu.real - SUMS[n]) < CLOSE:
+            if abs(2.0 * mu.real - RESONANCE_SUMS[n]) < SUM_TOLERANCE:
                 yield last, n, orbit
 
 
@@ -178,23 +177,21 @@ def _solved(plane: OrbitPlane, part: int, n: int, fraction: np.ndarray
             real = roots[np.abs(roots.imag) <= IMAGINARY_TOLERANCE * IMAGINARY_TOLERANCE].real
             pair = real[np.abs(real - target.real).argsort()[:2]]
             product, total = float(pair.prod()), float(pair.sum())
-        return np.array([product - 1.0, total - SUMS[n]])
+        return np.array([product - 1.0, total - RESONANCE_SUMS[n]])
 
     try:
         solution = arclength.newton(
-            gaps, fraction, steps=RESONANCE_STEPS, tolerance=RESONANCE_TOLERANCE,
-            difference=RESONANCE_DIFFERENCE, longest=REACH)
+            gaps, fraction, steps=RESONANCE_ITERATIONS, tolerance=RESONANCE_TOLERANCE,
+            difference=RESONANCE_DIFFERENCE, longest=MAX_RESONANCE_DISTANCE)
         return None if solution is None else (solution, float(np.abs(gaps(solution)).max()))
     except (CpgError, np.linalg.LinAlgError, IndexError):
         return None
 
 
-#: CURVES: most curves of a gait; MOST: most points of each; STEP, SHORTEST: longest and shortest
-#: step, as fractions of the ranges.
-CURVES, MOST, STEP, SHORTEST = 6, 120, 0.03, 2e-3
-#: EXACT: tolerance of g = 0; DIFFERENCE: step of its finite differences, as a fraction; NEWTON:
-#: most steps of Newton's method.
-EXACT, DIFFERENCE, NEWTON = 1e-8, 1e-5, 8
+#: Curves of a gait; points of each; steps, as fractions of the ranges.
+MAX_CURVES, MAX_POINTS, MAX_STEP, MIN_STEP = 6, 120, 0.03, 2e-3
+#: Tolerance of g = 0; step of its finite differences, as a fraction.
+CURVE_TOLERANCE, DIFFERENCE_STEP, NEWTON_ITERATIONS = 1e-8, 1e-5, 8
 
 Distance = Callable[[np.ndarray], float]
 
@@ -230,7 +227,7 @@ def orbit_curves(job: tuple[ParameterPlane, str, list[Edge]]) -> list[Boundary]:
             curves += _through(chart, gait, edge)
         except (arclength.NoOrbit, np.linalg.LinAlgError):
             continue
-        if len(curves) >= CURVES:
+        if len(curves) >= MAX_CURVES:
             break
     return curves
 
@@ -289,9 +286,9 @@ def _continue_edge(g: Distance, start: np.ndarray, direction: float) -> Iterator
             return None
         return None if (point < 0.0).any() or (point > 1.0).any() else (point, _normal(slope))
 
-    tangent = direction * _normal(arclength.derivatives(g, start, DIFFERENCE))
+    tangent = direction * _normal(arclength.derivatives(g, start, DIFFERENCE_STEP))
     return arclength.continue_along_tangents(
-        correct, start, tangent, (STEP, SHORTEST, STEP), aligned=0.8, most=MOST)
+        correct, start, tangent, (MAX_STEP, MIN_STEP, MAX_STEP), aligned=0.8, most=MAX_POINTS)
 
 
 def _normal(vector: np.ndarray) -> np.ndarray:
@@ -301,10 +298,10 @@ def _normal(vector: np.ndarray) -> np.ndarray:
 
 def _onto(g: Distance, fraction: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Apply Newton's method along a unit vector; return the point on it and the slope of g."""
-    for _ in range(NEWTON):
+    for _ in range(NEWTON_ITERATIONS):
         value = g(fraction)
-        if abs(value) < EXACT:
-            return fraction, arclength.derivatives(g, fraction, DIFFERENCE)
-        along = (g(fraction + DIFFERENCE * normal) - value) / DIFFERENCE
+        if abs(value) < CURVE_TOLERANCE:
+            return fraction, arclength.derivatives(g, fraction, DIFFERENCE_STEP)
+        along = (g(fraction + DIFFERENCE_STEP * normal) - value) / DIFFERENCE_STEP
         fraction = fraction - value / along * normal
     raise arclength.NoOrbit('the curve is lost')

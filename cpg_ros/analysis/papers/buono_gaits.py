@@ -47,7 +47,7 @@ from sympy.combinatorics import permutations as sympy_permutations
 
 #: Periods in which a disturbed gait settles: for some gaits, and for the others.
 SETTLING = {'jump': 150.0}
-USUALLY = 60.0
+DEFAULT_SETTLING = 60.0
 #: Periods in which a wave reverses.
 REVERSAL = 150.0
 
@@ -55,7 +55,7 @@ LEGS = ('LH', 'RH', 'LF', 'RF')
 #: Cells (from 1) that share the left hind leg in Table 4.
 LEFT_HIND = {'zig-zag': (1, 5), 'criss-cross': (1, 6)}
 #: Erratum 9: gait -> phase in the criss-cross network, where that section is wrong.
-NOT_REVERSED = {'pronk': '0', 'bound': '0', 'jump': '1/2'}
+WRONG_PHASES = {'pronk': '0', 'bound': '0', 'jump': '1/2'}
 CURRENT = '1'
 
 
@@ -77,7 +77,7 @@ def settled(name: str) -> SolvedGait:
     """Simulate a gait of Table 13 from near its orbit, with every cell disturbed."""
     network = Quadruped(*(float(value) for value in PRINTED['table_13'][name]))
     preset = Quadruped.presets()[name]
-    span = SETTLING.get(name, USUALLY) * preset.period
+    span = SETTLING.get(name, DEFAULT_SETTLING) * preset.period
     return SolvedGait(name, network, rhythm(network, disturbed_start(preset), span, Z4_Z2,
                                             primary_gaits(variables=2)))
 
@@ -124,11 +124,11 @@ def _table_2(gait: SolvedGait) -> Iterator[ReproducedRow]:
 def _section_7(gait: SolvedGait) -> Iterator[ReproducedRow]:
     at, name = Citation(AUTHORS, 'section 7'), gait.name
     for assignment, (first, second) in LEFT_HIND.items():
-        wrong = assignment == 'criss-cross' and name in NOT_REVERSED
+        wrong = assignment == 'criss-cross' and name in WRONG_PHASES
         yield at.phases(f'{name}: phase between the two cells of a leg, {assignment} network',
                         PRINTED['section_7'][assignment][name],
                         [gait.phases[second - 1] - gait.phases[first - 1]],
-                        erratum=(9, NOT_REVERSED[name]) if wrong else None,
+                        erratum=(9, WRONG_PHASES[name]) if wrong else None,
                         note=f'cells {first} and {second}')
 
 
@@ -350,12 +350,12 @@ def legs() -> Iterator[ReproducedRow | Picture]:
 
 # Buono & Golubitsky (2001), appendix A: Theorem A.1 with its conditions, by computation.
 
-#: POINTS: number of random points of Fix(K); ZERO: size up to which a value is 0.
-POINTS, ZERO = 400, 1e-9
+#: POINTS: number of random points of Fix(K); ZERO_TOLERANCE: size up to which a value is 0.
+POINTS, ZERO_TOLERANCE = 400, 1e-9
 #: Names of the conditions, in the order of the paper.
 CONDITIONS = ('A.2', 'A.3', 'A.5', 'A.6')
-#: HYPERBOLIC: distance of the multipliers from the unit circle above which an orbit is hyperbolic.
-HYPERBOLIC = 1e-3
+#: Distance of the multipliers from the unit circle above which an orbit is hyperbolic.
+HYPERBOLIC_THRESHOLD = 1e-3
 
 Representation = Callable[[Permutation], np.ndarray]
 
@@ -382,7 +382,7 @@ class Action:
         """Return which of the conditions A.2, A.3, A.5 and A.6 a pair does not meet."""
         basis = self.fixed(k)
         points = basis @ np.random.default_rng(0).standard_normal((basis.shape[1], POINTS))
-        isotropy = all(np.abs(self.matrix(g) @ points - points).max() > ZERO
+        isotropy = all(np.abs(self.matrix(g) @ points - points).max() > ZERO_TOLERANCE
                        for g in self.group - k)
         dimension = basis.shape[1]
         met = {'A.2': isotropy, 'A.3': dimension >= 2,
@@ -397,7 +397,7 @@ class Action:
         for g in self.group - k:
             # (g - 1) on Fix(K) has rank 1 where Fix(g) meets it in a hyperplane.
             _, sizes, rows = np.linalg.svd((self.matrix(g) - np.eye(len(basis))) @ basis)
-            if (sizes > ZERO).sum() == 1:
+            if (sizes > ZERO_TOLERANCE).sum() == 1:
                 normals.append(basis @ rows[0])
         if not normals:
             return True
@@ -478,7 +478,7 @@ def one_variable() -> Iterator[ReproducedRow | Picture]:
     roots = multipliers(orbit)
     gap = float(np.abs(np.abs(np.concatenate([roots.within, roots.transverse])) - 1.0).min())
     yield at.holds('a delay escapes that: one-dimensional cells have a hyperbolic trot with it',
-                   network.variables == 1 and orbit.residual < 1e-8 and gap > HYPERBOLIC,
+                   network.variables == 1 and orbit.residual < 1e-8 and gap > HYPERBOLIC_THRESHOLD,
                    note=f'Liu & Zhang (2024), period {orbit.period:.4f}, residual '
                         f'{orbit.residual:.0e}; the theorem is on ordinary differential equations')
 

@@ -205,12 +205,12 @@ def equal_couplings() -> Iterator[ReproducedRow | Picture]:
 #: Section 6. STAND: v_0 and w_0 at the stand; NU_0: trace of a cell there.
 STAND, NU_0 = ('0.31', '0.52'), '-1.24'
 #: 'Approximate values': this much of them.
-APPROXIMATE = 0.1
+APPROXIMATE_TOLERANCE = 0.1
 #: Erratum 6: alpha, gamma and xi of the trot's Hopf point, with the signs that are right.
 TROT = (-0.15, -0.16, 0.31)
 
 #: Point at which theorem 4.2 does not hold, by its gait and alpha.
-FAILING = ('walk', 0.05)
+FAILED_PROOF = ('walk', 0.05)
 
 
 def stand_sample(network: Network) -> Sample:
@@ -296,7 +296,7 @@ def table_12() -> Iterator[ReproducedRow | Picture]:
         printed = PRINTED['table_12'][gait][1 if name.startswith('gamma') else 0]
         points[gait] = hopf(Quadruped(alpha, alpha, gamma, gamma), line, gait, -0.35, -0.2)
         yield at.number(f'{gait}: {name} at the Hopf point', printed, points[gait].value,
-                        within=APPROXIMATE * abs(float(printed)),
+                        within=APPROXIMATE_TOLERANCE * abs(float(printed)),
                         note='the table says approximate; the other coupling as printed')
     alpha, gamma, xi = (float(row) for row in PRINTED['table_12']['trot'])
     sample = stand_sample(Quadruped(alpha, alpha, gamma, gamma, xi, xi))
@@ -334,7 +334,7 @@ def theorem_4_2() -> Iterator[ReproducedRow | Picture]:
             f'Hopf bifurcation to the {gait}, alpha {alpha:g}, beta {sign * alpha:g}, gamma '
             f'{point.value:.4f}', 'stable' if stable else 'unstable',
             'stable' if point.stable else 'unstable',
-            erratum=(23, 'unstable') if (gait, alpha) == FAILING else None,
+            erratum=(23, 'unstable') if (gait, alpha) == FAILED_PROOF else None,
             note=f'{point.unstable_roots} other eigenvalues with positive real part')
     trot = points['trot']
     sample = stand_sample(trot.network)
@@ -357,8 +357,8 @@ def theorem_4_2() -> Iterator[ReproducedRow | Picture]:
 #: Gait -> sign of beta against alpha, and the signs that alpha and gamma must have; 0 is any.
 SIGNS = {'pronk': (1, 1, 1), 'pace': (1, 1, -1), 'bound': (1, -1, 1), 'trot': (1, -1, -1),
          'jump': (-1, 0, 1), 'walk': (-1, 0, -1)}
-#: EQUAL: difference up to which couplings are equal, and eigenvalues on the imaginary axis.
-EQUAL = 1e-7
+#: Difference up to which couplings are equal, and eigenvalues on the imaginary axis.
+EQUALITY_TOLERANCE = 1e-7
 
 
 @dataclass(frozen=True)
@@ -422,8 +422,8 @@ def theorem_verdict(network: Quadruped, gait: str) -> TheoremVerdict:
                 'xi = 0': network.xi, 'eta = 0': network.eta,
                 'beta = alpha' if mirror > 0 else 'beta = -alpha':
                     network.beta - mirror * network.alpha}
-    unmet = [text for text, gap in required.items() if not abs(gap) <= EQUAL]
-    if abs(network.alpha) <= EQUAL:
+    unmet = [text for text, gap in required.items() if not abs(gap) <= EQUALITY_TOLERANCE]
+    if abs(network.alpha) <= EQUALITY_TOLERANCE:
         unmet.append('alpha different from 0')
     signs = [('alpha', along, network.alpha), ('gamma', across, network.gamma)]
     condition = ' and '.join(f'{name} {">" if sign > 0 else "<"} 0'
@@ -432,7 +432,7 @@ def theorem_verdict(network: Quadruped, gait: str) -> TheoremVerdict:
 
     overlooked = []
     split = blocks(network, equilibrium(network))
-    if max(block.leading.real for block in split if block.gait == gait) > EQUAL:
+    if max(block.leading.real for block in split if block.gait == gait) > EQUALITY_TOLERANCE:
         overlooked.append('the critical pair is the rightmost of its class')
     # For beta = alpha all real blocks have the discriminant of the critical one.
     if mirror < 0 and any(block.real and block.leading.imag == 0.0 for block in split):
@@ -449,14 +449,14 @@ PROOFS = {'walk': ('gamma=delta=-alpha=-beta', 'gamma=delta', -2.0, 0.5),
           'pace': ('gamma=delta=-alpha=-beta', 'gamma=delta', -2.0, 0.25),
           'bound': ('gamma=delta=-alpha=-beta', 'gamma=delta', 2.0, -0.25),
           'trot': ('xi=eta=-alpha=-beta', 'xi=eta', 2.0, -0.25)}
-#: DIFFERENCE: step of finite differences for the gradient of nu; OFF: distance from its line to
-#: which a Hopf point is followed; NONZERO: size above which determinants and speeds are not 0.
-DIFFERENCE, OFF, NONZERO = 1e-5, 0.02, 1e-6
-#: ON_AXIS: real part up to which a critical pair is on the imaginary axis.
-ON_AXIS = 1e-7
+#: Step of finite differences for the gradient of nu; distance from its line to which a Hopf point
+#: is followed; size above which determinants and speeds are not 0.
+DIFFERENCE_STEP, LINE_OFFSET, NONZERO_THRESHOLD = 1e-5, 0.02, 1e-6
+#: Real part up to which a critical pair is on the imaginary axis.
+AXIS_TOLERANCE = 1e-7
 #: Deviations of beta and delta with which it is checked that theorem 4.2 'remains valid if
 #: |alpha - beta| and |gamma - delta| are nonzero and small'.
-SMALL = (0.004, -0.003)
+SMALL_DEVIATIONS = (0.004, -0.003)
 #: ALPHAS: values of alpha at which Hopf points are searched for; GAMMAS: range of gamma.
 ALPHAS, GAMMAS = (-0.3, 0.1), (-1.2, 0.5)
 
@@ -469,8 +469,9 @@ def genericity_matrix(gait: str) -> np.ndarray:
     sample = stand_sample(UNCOUPLED)
     matrix = np.empty((3, 3))
     matrix[:2, :2] = sample.blocks['L_00'].now.real
-    matrix[2, :2] = [(_nu(sample.state + step) - _nu(sample.state - step)) / (2.0 * DIFFERENCE)
-                     for step in DIFFERENCE * np.eye(2)]
+    matrix[2, :2] = [
+        (_nu(sample.state + step) - _nu(sample.state - step)) / (2.0 * DIFFERENCE_STEP)
+        for step in DIFFERENCE_STEP * np.eye(2)]
     matrix[:2, 2], matrix[2, 2] = sample.state, PROOFS[gait][2]
     return matrix
 
@@ -493,17 +494,18 @@ def genericity() -> Iterator[ReproducedRow | Picture]:
             'eq. 5.6', 'generically nonzero')
         yield Citation(AUTHORS, theorem[0]).holds(
             f'{gait}: the determinant of eq. 5.6, of the genericity condition, is not 0',
-            abs(determinant) > NONZERO, note=f'{theorem[1]}: {determinant:.4f}')
+            abs(determinant) > NONZERO_THRESHOLD, note=f'{theorem[1]}: {determinant:.4f}')
         point = _on_line(gait)
         network = point.network
         assert isinstance(network, Quadruped)
-        beside = network.replace(alpha=network.alpha + OFF, beta=network.beta + OFF)
+        beside = network.replace(alpha=network.alpha + LINE_OFFSET,
+                                 beta=network.beta + LINE_OFFSET)
         start = getattr(network, free.split('=')[0])
-        near = hopf(beside, free, gait, start - 4.0 * OFF, start + 4.0 * OFF)
+        near = hopf(beside, free, gait, start - 4.0 * LINE_OFFSET, start + 4.0 * LINE_OFFSET)
         speed = near.normal_form.k1.real
         yield Citation(AUTHORS, 'Theorem 4.1').holds(
             f'{gait}: a branch of Hopf points leaves the line of the proof, at nonzero speed',
-            abs(speed) > NONZERO,
+            abs(speed) > NONZERO_THRESHOLD,
             note=f'at alpha = beta = {beside.alpha:.4f}: {free} = {near.value:.4f}, speed '
                  f'{speed:.3f}')
 
@@ -541,10 +543,10 @@ def stable_points() -> Iterator[ReproducedRow | Picture]:
 def near_equal() -> Iterator[ReproducedRow | Picture]:
     """Theorem 4.2 where alpha and beta, gamma and delta differ a little."""
     for clause, gait, alpha, sign, (low, high), stable in PRINTED['theorem_4_2']:
-        if not stable or (gait, alpha) == FAILING:
+        if not stable or (gait, alpha) == FAILED_PROOF:
             continue
         first = hopf(Quadruped(alpha, sign * alpha, 0.0, 0.0), 'gamma=delta', gait, low, high)
-        beta, delta = sign * alpha + SMALL[0], first.value + SMALL[1]
+        beta, delta = sign * alpha + SMALL_DEVIATIONS[0], first.value + SMALL_DEVIATIONS[1]
         point = hopf(Quadruped(alpha, beta, 0.0, delta), 'gamma', gait, first.value - 0.05,
                      first.value + 0.05)
         yield Citation(AUTHORS, f'Theorem 4.2 ({clause})').word(
@@ -563,7 +565,7 @@ def necessary_and_sufficient() -> Iterator[ReproducedRow | Picture]:
         agreed = [(along * alpha >= 0.0 and across * point.value > 0.0, point.stable)
                   for alpha, point in points[mirror] if point.gait == gait
                  # 'We always refer to the eigenvalue with greatest real part' (section 5.3).
-                  and point.block.roots(2).real.max() < ON_AXIS]
+                  and point.block.roots(2).real.max() < AXIS_TOLERANCE]
         otherwise = sum(met != stable for met, stable in agreed)
         yield Citation(AUTHORS, 'Theorem 4.2').holds(
             f'{gait}: the conditions are necessary and sufficient at equal couplings',

@@ -42,10 +42,10 @@ import numpy as np
 # Liu & Zhang (2024), section 2: the Taylor terms F_2 and F_3 of the delayed network.
 
 AUTHORS = 'Liu & Zhang 2024'
-#: BEHIND: cell, from 1, behind each cell on the same side, whose cube is in its row of F_3.
-BEHIND = (7, 8, 3, 2, 3, 4, 5, 6)
+#: PREDECESSORS: cell, from 1, behind each cell on the same side, whose cube is in its row of F_3.
+PREDECESSORS = (7, 8, 3, 2, 3, 4, 5, 6)
 #: Erratum 25: in the third row it should be this cell.
-THIRD = 1
+THIRD_PREDECESSOR = 1
 
 
 def taylor_terms() -> Iterator[ReproducedRow | Picture]:
@@ -63,12 +63,12 @@ def taylor_terms() -> Iterator[ReproducedRow | Picture]:
         return -tau / 3.0 * (b * now[cell]**3 + d * now[behind - 1]**3 + c * past[across[cell]]**3)
 
     third = tau * expansion.multilinear(*[(now, past)] * 3).real
-    for cell, behind in enumerate(BEHIND):
+    for cell, behind in enumerate(PREDECESSORS):
         value, wrong = cubes(cell, behind), cell == 2
         yield at.formula(f'row {cell + 1} of F_3 as printed, and of F_3/3!',
                          f'-tau/3 (b phi_{cell + 1}^3 + d phi_{behind}^3 + '
                          f'c phi_{across[cell] + 1}^3(-1))', value, float(third[cell]) / 6.0,
-                         erratum=(25, cubes(cell, THIRD)) if wrong else None)
+                         erratum=(25, cubes(cell, THIRD_PREDECESSOR)) if wrong else None)
     yield at.formula('row 1 of F_3, where F = F_2/2! + F_3/3!', 'as printed', cubes(0, 7),
                      float(third[0]), erratum=(25, 6.0 * cubes(0, 7)))
     # (tau + mu) L phi has mu L phi as its second-order part in (mu, phi): half of F_2.
@@ -94,10 +94,10 @@ def published_normal_form(point: HopfPoint) -> NormalForm:
     return NormalForm(eight * (-a - b - d + past), -tau * eight * (-b + past - d))
 
 
-#: DEVELOPED: model time in which a gait develops; DRAWN: model time that is drawn.
-DEVELOPED, DRAWN = 120.0, 20.0
+#: Model times in which a gait develops, and which is drawn.
+SETTLING_TIME, FIGURE_TIME = 120.0, 20.0
 #: Start values printed under Figures 3 and 4.
-HALVES = (0.1, -0.1, 0.2, -0.2, 0.1, -0.1, 0.2, -0.2)
+START_VALUES = (0.1, -0.1, 0.2, -0.2, 0.1, -0.1, 0.2, -0.2)
 
 
 @dataclass(frozen=True)
@@ -132,10 +132,10 @@ PRINTED = printed_values('liu_zhang')
 EXAMPLES = {name: Example(network=Delayed(*parameters), **example) for name, (parameters, example)
             in PRINTED['examples'].items()}
 SOLUTIONS = {'c': '6.4300', 'tau': '0.2450'}
-#: SAMPLES: samples of a cycle; MISFIT: RMS of the noise that makes a recording of the orbit.
-SAMPLES, MISFIT = 20, 0.35
-#: ONE_MINIMUM: largest difference between the minima that different starts reach.
-ONE_MINIMUM = 1e-4
+#: Samples of a cycle; RMS of the noise that makes a recording of the orbit.
+NUM_SAMPLES, NOISE_RMS = 20, 0.35
+#: Difference between the minima that different starts reach.
+MINIMUM_TOLERANCE = 1e-4
 
 
 def _coefficients(example: Example, point: HopfPoint) -> Iterator[ReproducedRow]:
@@ -196,13 +196,13 @@ def _simulated(example: Example) -> Iterator[ReproducedRow | Picture]:
     gait, figure = example.gait, f'Figure {example.figure}'
     at = Citation(AUTHORS, figure)
     gaits = primary_gaits(variables=1)
-    seen = rhythm(example.network, example.start, DEVELOPED, Z4_Z2, gaits)
+    seen = rhythm(example.network, example.start, SETTLING_TIME, Z4_Z2, gaits)
     phases = f'phases of cells 1 to 4: {np.round(seen.end.phases[:4], 4) % 1.0}'
     yield at.word('gait that the printed start values lead to', gait, seen.kind,
                   erratum=example.wrong_start, note=phases)
     caption = f'From the printed start values: {seen.kind}.'
     if example.wrong_start:
-        seen = rhythm(example.network, HALVES, DEVELOPED, Z4_Z2, gaits)
+        seen = rhythm(example.network, START_VALUES, SETTLING_TIME, Z4_Z2, gaits)
         yield at.word('gait that the start values of Figures 3 and 4 lead to', gait, seen.kind,
                       note='0.1, -0.1, 0.2, -0.2, 0.1, -0.1, 0.2, -0.2')
         caption = (f'From the start values of Figure 3, as those printed lead to another gait '
@@ -212,7 +212,7 @@ def _simulated(example: Example) -> Iterator[ReproducedRow | Picture]:
         sense = {'walk-': 'walk', 'walk+': 'diagonal-sequence walk'}.get(seen.gait, seen.gait)
         yield at.word('walk as quadrupeds walk: LH, LF, RH, RF', 'walk', sense,
                       erratum=(7, 'diagonal-sequence walk'), note=phases)
-    drawn = seen.run.t <= DRAWN
+    drawn = seen.run.t <= FIGURE_TIME
     yield Picture(AUTHORS, figure, caption, trajectories(
         f'{AUTHORS}, {figure}: {seen.kind}, tau {example.network.tau:g}', seen.run.t[drawn],
         seen.run.x[drawn, :4], ('$x_1$ (LH)', '$x_2$ (RH)', '$x_3$ (LF)', '$x_4$ (RF)')))
@@ -238,10 +238,10 @@ def recording(example: Example, name: str) -> tuple[np.ndarray, np.ndarray]:
         Samples, shape (SAMPLES, 8), and their times in cycles, shape (SAMPLES,).
 
     """
-    theta = np.arange(SAMPLES) / SAMPLES
+    theta = np.arange(NUM_SAMPLES) / NUM_SAMPLES
     states, slopes = cycle_samples(solve_orbit(example.network, example.gait), theta)
     slope = slopes[..., example.network.parameters().index(name)]
-    misfit = MISFIT * np.random.default_rng(0).standard_normal(states.shape)
+    misfit = NOISE_RMS * np.random.default_rng(0).standard_normal(states.shape)
     misfit -= slope * np.sum(misfit * slope) / np.sum(slope * slope)
     return states + misfit, theta
 
@@ -265,10 +265,10 @@ def inversion(number: int, key: str, name: str) -> Iterator[ReproducedRow | Pict
     values = np.array([fit.values[0] for fit in fits.values()])
     best = fitted(getattr(example.network, name))
     yield at.holds(f'every start reaches one minimum of f by {name}',
-                   bool(np.ptp([*values, best.values[0]]) <= ONE_MINIMUM),
-                   note=f'to {ONE_MINIMUM:g}, and the one that is reached from the truth')
+                   bool(np.ptp([*values, best.values[0]]) <= MINIMUM_TOLERANCE),
+                   note=f'to {MINIMUM_TOLERANCE:g}, and the one that is reached from the truth')
     yield at.holds('every start reaches the same error f',
-                   bool(np.ptp([fit.cost for fit in fits.values()]) <= ONE_MINIMUM))
+                   bool(np.ptp([fit.cost for fit in fits.values()]) <= MINIMUM_TOLERANCE))
 
 
 PAPER = Paper('liu_zhang', AUTHORS,

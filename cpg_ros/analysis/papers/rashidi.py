@@ -26,7 +26,7 @@ from cpg_ros.analysis.papers.row import (
     Citation,
     disturbed_start,
     Paper,
-    PHASE,
+    PHASE_TOLERANCE,
     Picture,
     printed_values,
     ReproducedRow,
@@ -46,11 +46,10 @@ AUTHORS = 'Rashidi et al. 2016'
 NAMES = ('left flexor', 'right flexor', 'left extensor', 'right extensor')
 
 PRINTED = printed_values('rashidi')
-#: SETTLING: model time in which a gait settles; CLOSE: largest objective that counts as 0,
-#: degrees.
-SETTLING, CLOSE = 1500.0, 1.0
-#: SAME: difference in shape, over the RMS, up to which two waveforms are one.
-SAME = 0.02
+#: Model time in which a gait settles; objective that counts as 0, degrees.
+SETTLING, OBJECTIVE_TOLERANCE = 1500.0, 1.0
+#: Difference in shape, over the RMS, up to which two waveforms are one.
+SIGNAL_TOLERANCE = 0.02
 #: POPULATION, GENERATIONS: of the search; the paper prints none.
 POPULATION, GENERATIONS = 24, 4
 
@@ -97,14 +96,15 @@ def signals(seen: Rhythm) -> list[str]:
     names = []
     for cell in range(4):
         like = next((n for n, other in enumerate(first)
-                     if shape_difference(cycle[:, cell], cycle[:, other]) < SAME), None)
+                     if shape_difference(cycle[:, cell], cycle[:, other]) < SIGNAL_TOLERANCE
+                     ), None)
         if like is None:
             first.append(cell)
             names.append(f'y{len(first)}')
             continue
         shift = float(lag(cycle[:, cell], cycle[:, first[like]])) % 1.0
         half = round(2.0 * shift) / 2.0 % 1.0
-        exact = abs((shift - half + 0.5) % 1.0 - 0.5) <= PHASE
+        exact = abs((shift - half + 0.5) % 1.0 - 0.5) <= PHASE_TOLERANCE
         shown = half if exact else round(shift, 3)
         names.append(f'y{like + 1}' + (f'+{shown:g}' if shown else ''))
     return names
@@ -171,7 +171,7 @@ def primary() -> Iterator[ReproducedRow | Picture]:
             off = abs((360.0 * phase - degrees + 180.0) % 360.0 - 180.0)
             yield Citation(AUTHORS, equation).number(
                 f'objective z_{n} of the {name} [degrees], which is to vanish', '0.00', off,
-                within=CLOSE, erratum=(8, '180'),
+                within=OBJECTIVE_TOLERANCE, erratum=(8, '180'),
                 note=f'phase of cell {n + 1} {360.0 * phase:.2f}')
         yield from _table_5(gait, seen)
         start = simulated(printed(gait), tuple(np.ravel(PRINTED['table_3'][gait]).tolist()))
@@ -196,13 +196,13 @@ def search() -> Iterator[ReproducedRow | Picture]:
         theirs = evaluate([printed(gait)], gait, 0, 0)[0].errors
         yield at.number(
             f'largest objective of the best set that the search finds for the {named(gait)} '
-            '[degrees]', '0.00', float(front.max(axis=1).min()), within=CLOSE,
+            '[degrees]', '0.00', float(front.max(axis=1).min()), within=OBJECTIVE_TOLERANCE,
             note=f'z_1 to z_3 of its front of {len(front)} sets, of {len(tried)} tried: {ranges}; '
             'population and generations are ours')
         yield at.holds(
             f'no set that the search finds dominates the weights of Table 2, {named(gait)}',
-            not ((front <= theirs + CLOSE).all(axis=1)
-                 & (front < theirs - CLOSE).any(axis=1)).any(),
+            not ((front <= theirs + OBJECTIVE_TOLERANCE).all(axis=1)
+                 & (front < theirs - OBJECTIVE_TOLERANCE).any(axis=1)).any(),
             note=f'z_1 to z_3 with these {", ".join(f"{error:.2f}" for error in theirs)}')
 
 
@@ -291,7 +291,7 @@ def kinds() -> Iterator[ReproducedRow | Picture]:
         h = max(abs((walk.distances[name][0] + 0.5) % 1.0 - 0.5) for name in elements)
         yield Citation(AUTHORS, 'Table 5').word(
             f'the symmetries in {letter} are', wrong,
-            'spatio-temporal' if h > PHASE else 'spatial', erratum=(17, right))
+            'spatio-temporal' if h > PHASE_TOLERANCE else 'spatial', erratum=(17, right))
 
 
 PAPER = Paper('rashidi', AUTHORS,

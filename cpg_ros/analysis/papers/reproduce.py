@@ -72,8 +72,8 @@ ERRATA: dict[int, tuple[str, str]] = {
     yaml.safe_load(Path(__file__).with_name('errata.yaml').read_text('utf-8')).items()}
 
 
-#: RESOLUTION: of a figure, dots per inch.
-RESOLUTION = 100
+#: FIGURE_DPI: of a figure, dots per inch.
+FIGURE_DPI = 100
 
 
 @dataclass(frozen=True)
@@ -125,7 +125,7 @@ def _section(paper: Paper, number: int, draw: bool) -> tuple[list[ReproducedRow]
             if isinstance(row, ReproducedRow):
                 rows.append(row)
             elif draw:
-                figures.append(replace(row, figure=rendered(row.figure, dpi=RESOLUTION)))
+                figures.append(replace(row, figure=rendered(row.figure, dpi=FIGURE_DPI)))
     except (CpgError, ArithmeticError) as error:
         name = getattr(section, 'func', section).__name__.replace('_', ' ')
         rows.append(ReproducedRow(paper.authors, name, 'what is printed here', 'a result',
@@ -163,9 +163,9 @@ def sections(names: Sequence[str]) -> int:
 
 # The reproduction report as a table, as JSON and as a page that needs no other file.
 
-#: WIDEST: largest widths of the columns quantity, published and computed on a terminal.
-WIDEST = (58, 30, 30)
-HEAD = ('place', 'quantity', 'published', 'computed', 'verdict')
+#: Of the columns quantity, published and computed on a terminal.
+MAX_WIDTHS = (58, 30, 30)
+COLUMNS = ('place', 'quantity', 'published', 'computed', 'verdict')
 
 
 def _cut(text: str, width: int) -> str:
@@ -174,9 +174,9 @@ def _cut(text: str, width: int) -> str:
 
 def table(report: Reproduction) -> str:
     """Write the rows by paper in aligned columns, the errata that were used, and the summary."""
-    head, *rest = command_line.table([HEAD, *(
+    head, *rest = command_line.table([COLUMNS, *(
         (row.place, *(_cut(text, width) for text, width in zip(
-            (row.quantity, row.published, row.computed), WIDEST, strict=True)), row.verdict)
+            (row.quantity, row.published, row.computed), MAX_WIDTHS, strict=True)), row.verdict)
         for row in report.rows)])
     lines: list[str] = []
     for paper in report.papers:
@@ -218,7 +218,7 @@ def as_html(report: Reproduction) -> str:
     parts = [f'<p>{escape(report.summary)}.</p>']
     for paper in report.papers:
         parts += [f'<h2>{escape(paper.reference)}</h2>', html_table(
-            (*HEAD, 'note; how compared'),
+            (*COLUMNS, 'note; how compared'),
             [_line(row) for row in report.rows if row.paper == paper.authors])]
         for figure in report.figures:
             if figure.paper == paper.authors:

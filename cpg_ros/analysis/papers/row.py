@@ -79,10 +79,10 @@ def trajectories(title: str, t: np.ndarray, x: np.ndarray, names: Sequence[str],
     return figure
 
 
-#: PHASE: tolerance of phases, cycles; FORMULA: relative tolerance of the values of a formula.
-PHASE, FORMULA = 0.002, 1e-9
-#: MORE: number of decimals that a computed value has beyond the printed one.
-MORE = 2
+#: Of phases, cycles; of the values of a formula, relative.
+PHASE_TOLERANCE, FORMULA_TOLERANCE = 0.002, 1e-9
+#: Decimals that a computed value has beyond the printed one.
+NUM_EXTRA_DIGITS = 2
 
 
 @dataclass(frozen=True)
@@ -225,13 +225,13 @@ class Citation:
             return bool(abs(computed - float(text)) <= limit * (1.0 + 1e-9))
 
         exponent = _exponent(published) if within is None else int(np.floor(np.log10(within)))
-        digits = max(0, -exponent) + MORE
+        digits = max(0, -exponent) + NUM_EXTRA_DIGITS
         shown = str(computed) if isinstance(computed, int) else f'{computed:.{digits}f}'
         how = 'to the last digit printed' if within is None else f'within {within:g}'
         return self._row(quantity, published, shown, same, how, float(computed), erratum, note)
 
     def phases(self, quantity: str, published: str, computed: Sequence[float] | np.ndarray, *,
-               within: float = PHASE, erratum: tuple[int, str] | None = None,
+               within: float = PHASE_TOLERANCE, erratum: tuple[int, str] | None = None,
                note: str = '') -> ReproducedRow:
         """Quote phases in cycles, printed as fractions with blanks between; compared modulo 1."""
         ours = np.asarray(computed, dtype=float)
@@ -279,7 +279,7 @@ class Citation:
 
         """
         ours = np.ravel(computed)
-        limit = FORMULA * max(1.0, float(np.abs(ours).max()))
+        limit = FORMULA_TOLERANCE * max(1.0, float(np.abs(ours).max()))
         number, right = erratum or (None, None)
         if isinstance(value, Mapping):
             right = value_of(right, value) if isinstance(right, str) else right
@@ -291,7 +291,8 @@ class Citation:
 
         single = float(ours[0].real) if ours.size == 1 and not np.iscomplexobj(ours) else None
         return ReproducedRow(self.paper, self.place, quantity, f'{published} = {_shown(value)}',
-                             _shown(ours), same(value), f'at one set of couplings, to {FORMULA:g}',
+                             _shown(ours), same(value),
+                             f'at one set of couplings, to {FORMULA_TOLERANCE:g}',
                              single, number, '' if right is None else _shown(right),
                              right is not None and same(right), note)
 
@@ -312,8 +313,8 @@ def _shown(value: Any) -> str:
 
 # Constants of a Morris-Lecar cell, read off the compiled rates of a network in closed form.
 
-#: FAR: potentials at which m is 0 or 1 to rounding; NEAR: potentials at which m and n bend.
-FAR, NEAR = np.array([6.0, 8.0]), np.array([-0.05, 0.0, 0.05, 0.1, 0.2])
+#: Potentials at which m is 0 or 1 to rounding, and at which m and n bend.
+SATURATED_POTENTIALS, POTENTIALS = np.array([6.0, 8.0]), np.array([-0.05, 0.0, 0.05, 0.1, 0.2])
 
 
 def _rates(network: Quadruped | Biped, v: np.ndarray, w: float) -> np.ndarray:
@@ -337,7 +338,7 @@ def cell_constants(network: Quadruped | Biped, current: float) -> dict[str, floa
         its smallest value.
 
     """
-    v = np.concatenate([-FAR, FAR, NEAR])
+    v = np.concatenate([-SATURATED_POTENTIALS, SATURATED_POTENTIALS, POTENTIALS])
     closed, opened = _rates(network, v, 0.0), _rates(network, v, 1.0)
     slope, offset = np.polyfit(v, (opened - closed)[:, 0], 1)
     g_k, v_k = -slope, offset / -slope
@@ -345,7 +346,7 @@ def cell_constants(network: Quadruped | Biped, current: float) -> dict[str, floa
     high_slope, high = np.polyfit(v[2:4], closed[2:4, 0], 1)
     g_l, g_ca = -low_slope, low_slope - high_slope
     v_l, v_ca = (low - current) / g_l, (high - low) / g_ca
-    m = (closed[4:, 0] - (low + low_slope * NEAR)) / (-g_ca * (NEAR - v_ca))
+    m = (closed[4:, 0] - (low + low_slope * POTENTIALS)) / (-g_ca * (POTENTIALS - v_ca))
     v1, v2 = _bend(m)
     speed = (closed - opened)[4:, 1]
     v3, v4 = _bend(closed[4:, 1] / speed)
@@ -360,13 +361,13 @@ def cell_constants(network: Quadruped | Biped, current: float) -> dict[str, floa
 
 
 def _bend(fraction: np.ndarray) -> tuple[float, float]:
-    """Middle and width of ``(1 + tanh((v - middle)/width))/2`` from its values at NEAR."""
-    slope, offset = np.polyfit(NEAR, np.arctanh(2.0 * fraction - 1.0), 1)
+    """Middle and width of ``(1 + tanh((v - middle)/width))/2`` from its values at POTENTIALS."""
+    slope, offset = np.polyfit(POTENTIALS, np.arctanh(2.0 * fraction - 1.0), 1)
     return float(-offset / slope), float(1.0 / slope)
 
 
 #: Fraction of a simulation, from its end, on which the rhythm is measured.
-SETTLED = 0.15
+FINAL_FRACTION = 0.15
 #: DISTURBANCE: standard deviation of a disturbed start, in the units of the cells.
 DISTURBANCE = 0.01
 
@@ -432,7 +433,7 @@ def rhythm(network: Network, start: Sequence[float] | np.ndarray, t_end: float, 
 
     """
     run = simulate(network, np.asarray(start, dtype=float), t_end, network.step, progress=False)
-    cycle = last_cycle(run, network.cells, int((1.0 - SETTLED) * run.t.size))
+    cycle = last_cycle(run, network.cells, int((1.0 - FINAL_FRACTION) * run.t.size))
     if cycle is None:
         raise InputError('the simulation ends at rest, or does not repeat')
     return Rhythm(run, cycle, recognise(cycle.signals[:, :network.cells], group, gaits))

@@ -146,7 +146,7 @@ def test_a_neutral_multiplier_that_rounding_puts_below_1_crosses_nothing(monkeyp
 
 
 def test_a_torus_curve_has_a_pair_on_the_unit_circle(monkeypatch):
-    monkeypatch.setattr(curves, 'MOST', 2)
+    monkeypatch.setattr(curves, 'MAX_POINTS', 2)
     chart = chart_of('delayed', TROT, OVER, (9, 9))
     found = curves.orbit_curves((chart, 'walk', [curves.Edge(
         np.array([5 / 8, 0.3]), np.array([5 / 8, 0.5]), *_wave(chart, 0.3))]))
@@ -171,7 +171,7 @@ def test_a_curve_of_folds_is_where_branches_turn(monkeypatch):
     assert first.value == pytest.approx(0.1367076463, abs=1e-9)
     chart = chart_of('quadruped', preset.network, [('xi', (-0.05, 0.05)),
                                                    ('alpha=beta', (0.1, 0.2))], (9, 9))
-    monkeypatch.setattr(fold_curves, 'SHORTEST', 0.02)
+    monkeypatch.setattr(fold_curves, 'MIN_STEP', 0.02)
     found = fold_curves.continue_fold(chart, first.curve_point, 0.0, 1.0)
     assert len(found) >= 10
     xi, fold = found[3]
