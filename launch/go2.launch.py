@@ -24,7 +24,7 @@ from pathlib import Path
 from cpg_ros.common.files import resource_folder
 from cpg_ros.motion.robot_file import load_robot
 from cpg_ros.ros.launch_arguments import declared, page, started, value, viewers
-from cpg_ros.ros.launch_arguments import GENERATOR as COMMON
+from cpg_ros.ros.launch_arguments import GENERATOR_ARGUMENTS as COMMON
 from launch import LaunchDescription
 from launch.actions import OpaqueFunction, Shutdown
 from launch.substitutions import LaunchConfiguration

@@ -22,7 +22,7 @@ Unitree's simulator on this computer.
 import os
 
 from cpg_ros.ros.launch_arguments import declared, page, started, value
-from cpg_ros.ros.launch_arguments import GENERATOR as COMMON
+from cpg_ros.ros.launch_arguments import GENERATOR_ARGUMENTS as COMMON
 from launch import LaunchDescription
 from launch.actions import (
     ExecuteProcess,

@@ -18,7 +18,7 @@ Read docs/how_to/servos.md first. The generator, the bridge that leads the robot
 its servos are on. The robot lies still until the bridge's service ~/start is called.
 """
 
-from cpg_ros.ros.launch_arguments import declared, GENERATOR, page, started
+from cpg_ros.ros.launch_arguments import declared, GENERATOR_ARGUMENTS, page, started
 from launch import LaunchDescription
 from launch.actions import OpaqueFunction, Shutdown
 
@@ -50,7 +50,7 @@ def nodes(context):
                 on_exit=Shutdown(), sigterm_timeout=SITTING),
         # Its end makes the robot sit down; the bridge must be there to do it.
         started(context, 'generator', 'cpg_generator', {
-            **ROBOT, **GENERATOR, 'rate': SERVOS['rate']}, {
+            **ROBOT, **GENERATOR_ARGUMENTS, 'rate': SERVOS['rate']}, {
                 # The bridge leads the robot from where it is.
                 'combined_topic': '', 'assume_stand': True, **COMMAND}),
         *page(context)]
@@ -58,5 +58,6 @@ def nodes(context):
 
 def generate_launch_description():
     """Return bus, bridge and generator, optionally in a namespace."""
-    return LaunchDescription([*declared({**ROBOT, **SERVOS, **BUS, **GENERATOR, **BRIDGE}),
-                              OpaqueFunction(function=nodes)])
+    return LaunchDescription([
+        *declared({**ROBOT, **SERVOS, **BUS, **GENERATOR_ARGUMENTS, **BRIDGE}),
+        OpaqueFunction(function=nodes)])

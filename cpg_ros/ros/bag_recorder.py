@@ -24,9 +24,9 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rosbags.interfaces import Connection
 
-#: EVERY: period in which the caller takes the messages, s; DEPTH: most messages of a topic that
-#: wait for the disk.
-EVERY, DEPTH = 0.02, 5000
+#: POLL_PERIOD: period in which the caller takes the messages, s; QUEUE_DEPTH: most messages of a
+#: topic that wait for the disk.
+POLL_PERIOD, QUEUE_DEPTH = 0.02, 5000
 
 
 class BagRecorder:
@@ -72,7 +72,7 @@ class BagRecorder:
         reliable = all(publisher.reliability == ReliabilityPolicy.RELIABLE
                        for publisher in offered)
         quality = QoSProfile(
-            depth=DEPTH,
+            depth=QUEUE_DEPTH,
             durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
             reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT)
         self._sources.append((PolledSubscription(self._node, message, topic, quality, raw=True,

@@ -37,10 +37,10 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 # The topic ``kp_scale``: the factor of the servos' proportional gain that the feedback requests.
 
 KP_SCALE_TOPIC = 'kp_scale'
-#: REPEAT: period in which a factor other than 1 is published, s; STALE: time without a message
-#: after which receivers use 1 again, s.
-REPEAT, STALE = 0.02, 0.1
-LARGEST_SCALE = LAW.gains['stiffen_kp'].high
+#: REPEAT_PERIOD: of a factor other than 1, s; SCALE_TIMEOUT: without a message, after which
+#: receivers use 1 again, s.
+REPEAT_PERIOD, SCALE_TIMEOUT = 0.02, 0.1
+MAX_KP_SCALE = LAW.gains['stiffen_kp'].high
 
 
 def kp_scale_block(node: Node, scale: np.ndarray) -> MessageBlock:
@@ -48,7 +48,7 @@ def kp_scale_block(node: Node, scale: np.ndarray) -> MessageBlock:
     message = Float64()
     return MessageBlock(node, [1], [(KP_SCALE_TOPIC, Template(
         message, numbers=[(message, 'data', np.arange(1))]))]).feed(
-            scale, period=REPEAT, quiet=True)
+            scale, period=REPEAT_PERIOD, quiet=True)
 
 
 class KpScaleSubscription:
@@ -66,9 +66,9 @@ class KpScaleSubscription:
 
         """
         if (message := self._subscription.newest()) is not None:
-            valid = 1.0 <= message.data <= LARGEST_SCALE
+            valid = 1.0 <= message.data <= MAX_KP_SCALE
             self._scale, self._received = message.data if valid else 1.0, now
-        if self._scale != 1.0 and not 0.0 <= now - self._received < STALE:
+        if self._scale != 1.0 and not 0.0 <= now - self._received < SCALE_TIMEOUT:
             self._scale = 1.0
         return self._scale
 
@@ -103,7 +103,7 @@ class HeldSubscription:
 
 
 #: Least time between two warnings about messages, s.
-QUIET = 10.0
+WARNING_PERIOD = 10.0
 
 
 class _Bad(CpgError):
@@ -115,9 +115,9 @@ class _Bad(CpgError):
 FEEDFORWARD_TOPIC = 'feedforward/joint_states'
 FEEDFORWARD = Spec(0.0, f"largest torque that messages on {FEEDFORWARD_TOPIC} may add, as a "
                    "fraction of the motors' limits; 0 ignores them", 0.0, 1.0)
-#: FEEDFORWARD_TIMEOUT: time without a message after which torques fall to 0, s; FEEDFORWARD_RISE:
-#: time in which a torque passes from 0 to its limit, s.
-FEEDFORWARD_TIMEOUT, FEEDFORWARD_RISE = 0.05, 0.05
+#: FEEDFORWARD_TIMEOUT: time without a message after which torques fall to 0, s;
+#: FEEDFORWARD_RISE_TIME: time in which a torque passes from 0 to its limit, s.
+FEEDFORWARD_TIMEOUT, FEEDFORWARD_RISE_TIME = 0.05, 0.05
 
 
 class FeedforwardSubscription:
@@ -156,9 +156,10 @@ class FeedforwardSubscription:
                 self._goal = self._read(message)
             except _Bad as error:
                 self._goal = np.zeros(len(self._limit))
-                self._node.get_logger().warning(f'ignored: {error}', throttle_duration_sec=QUIET)
+                self._node.get_logger().warning(f'ignored: {error}',
+                                                throttle_duration_sec=WARNING_PERIOD)
         valid = active and 0.0 <= now - self._received < FEEDFORWARD_TIMEOUT
-        step = self._limit * min(max(now - self._before, 0.0) / FEEDFORWARD_RISE, 1.0)
+        step = self._limit * min(max(now - self._before, 0.0) / FEEDFORWARD_RISE_TIME, 1.0)
         self._before = now
         self.torque = self.torque + np.clip(self._goal * valid - self.torque, -step, step)
         return self.torque
@@ -251,7 +252,7 @@ class Commands:
                 except _Bad as error:
                     self.refused = str(error)
                     self._node.get_logger().warning(f'ignored: {error}',
-                                                    throttle_duration_sec=QUIET)
+                                                    throttle_duration_sec=WARNING_PERIOD)
         return all(self._fresh)
 
     def _states(self, topic: str, joints: tuple[str, ...], message: JointState) -> bool:

@@ -65,7 +65,7 @@ from std_srvs.srv import SetBool
 # The generator's health, once a second on /diagnostics.
 
 #: Time between two warnings of jumps of simulated time in the log, s.
-QUIET = 5.0
+WARNING_PERIOD = 5.0
 
 
 class Diagnostics:
@@ -111,7 +111,7 @@ class Diagnostics:
         elif new['jumps back of simulated time']:
             level = DiagnosticStatus.WARN
             text = self._why_anew(new['jumps back of simulated time'])
-            self._node.get_logger().warning(text, throttle_duration_sec=QUIET)
+            self._node.get_logger().warning(text, throttle_duration_sec=WARNING_PERIOD)
         elif self._silent > 1.0 / self._ticker.rate:
             level, text = DiagnosticStatus.WARN, f'nothing is published: {self._why_silent()}'
         elif 100 * new['dropped ticks'] > new['ticks']:
@@ -169,16 +169,16 @@ class Diagnostics:
 
 
 NAME = 'cpg_generator'
-#: After a signal that ends the node. LAST_RAMP: duration of the ramp to the stand, s;
-#: LAST_DEADLINE: time after which the node ends, s.
-LAST_RAMP, LAST_DEADLINE = 0.5, 0.95
-#: LAST_CROUCH: the same deadline for a biped that balances, s: it slows down, stands and crouches.
-LAST_CROUCH = 8.0
-#: DISCOVERY: time after which two nodes have discovered each other, s: announcements repeat every
-#: 3 s, and a busy machine may lose the first ones.
-DISCOVERY = 3.5
-#: SEARCH: period in which the node looks for the joints' initial pose, s.
-SEARCH = 0.05
+#: After a signal that ends the node. SHUTDOWN_RAMP: duration of the ramp to the stand, s;
+#: SHUTDOWN_TIMEOUT: deadline of the node's end, s.
+SHUTDOWN_RAMP, SHUTDOWN_TIMEOUT = 0.5, 0.95
+#: The same deadline for a biped that balances, s: it slows down, stands and crouches.
+CROUCH_TIMEOUT = 8.0
+#: DISCOVERY_TIME: time after which two nodes have discovered each other, s: announcements repeat
+#: every 3 s, and a busy machine may lose the first ones.
+DISCOVERY_TIME = 3.5
+#: SEARCH_PERIOD: period in which the node looks for the joints' initial pose, s.
+SEARCH_PERIOD = 0.05
 
 
 class Generator(StartedNode):
@@ -227,7 +227,8 @@ class Generator(StartedNode):
         self.add_on_set_parameters_callback(self._validate)
         self.add_post_set_parameters_callback(self._apply)
         self._warn_of_unknown()
-        if self._value('exclusive') and self._others.seek(joined + DISCOVERY - time.monotonic()):
+        wait = joined + DISCOVERY_TIME - time.monotonic()
+        if self._value('exclusive') and self._others.seek(wait):
             raise StartError(f'{self._others.text}: stop that publisher, rename the topic, '
                              'or set exclusive to false')
         self._lifecycle = Lifecycle(self, {
@@ -544,7 +545,7 @@ class Generator(StartedNode):
         """Restart after simulated time jumped back; the diagnostics log the jump."""
         ramp = self._value('ramp')
         # At the end there is no time for a longer one.
-        self.pattern.restart(min(ramp, LAST_RAMP) if self.stop.is_set() else ramp,
+        self.pattern.restart(min(ramp, SHUTDOWN_RAMP) if self.stop.is_set() else ramp,
                              self.pattern.enabled)
         self._feedback.restart()
 
@@ -558,7 +559,7 @@ class Generator(StartedNode):
         elif self._value('autostart') and self._needs_pose and self._measured is not None:
             self.get_logger().info('publishing nothing until the pose is measured on '
                                    f'{self._measured.topic}, then {at}')
-            self._search = self.create_timer(SEARCH, self._await_pose, clock=STEADY)
+            self._search = self.create_timer(SEARCH_PERIOD, self._await_pose, clock=STEADY)
         elif self._value('autostart'):
             self.get_logger().info(f'publishing {at}')
             self.ticker.start()
@@ -573,30 +574,30 @@ class Generator(StartedNode):
         return 0.02 if self._feedback.active else 0.1
 
     def finish(self) -> None:
-        """Ramp down to the stand, then stop publishing, within LAST_DEADLINE.
+        """Ramp down to the stand, then stop publishing, within SHUTDOWN_TIMEOUT.
 
         A balancing biped crouches instead, and a robot with ``end: sit`` sits down, within
-        LAST_CROUCH; a second signal later than LAST_DEADLINE ends that at once.
+        CROUCH_TIMEOUT; a second signal later than SHUTDOWN_TIMEOUT ends that at once.
         """
         began = time.monotonic()
         crouches = isinstance(self.pattern, BalancedPattern) and self.pattern.lower()
         sits = self._value('end') == 'sit'
-        deadline = began + (LAST_CROUCH if crouches or sits else LAST_DEADLINE)
+        deadline = began + (CROUCH_TIMEOUT if crouches or sits else SHUTDOWN_TIMEOUT)
         if self.ticker.is_alive() and self.ticker.ticks and (sits or not self.pattern.standing):
             self.get_logger().info(
                 'coming to a stand and crouching before the end' if crouches else
-                f'ramping down over {LAST_RAMP:g} s{", sitting down" if sits else ""} before the '
-                'end')
+                f'ramping down over {SHUTDOWN_RAMP:g} s{", sitting down" if sits else ""} before '
+                'the end')
             if self._cmd_vel:
                 self._cmd_vel.end()
-            self.pattern.enable(False, LAST_RAMP)
+            self.pattern.enable(False, SHUTDOWN_RAMP)
             self.ticker.stop_moving()
             early = 0
             while time.monotonic() < deadline and not (
                     self.pattern.standing and (not sits or self._posture.end())):
                 time.sleep(0.005)
                 # Launched from a terminal, a process gets the same Ctrl-C twice.
-                if time.monotonic() < began + LAST_DEADLINE:
+                if time.monotonic() < began + SHUTDOWN_TIMEOUT:
                     early = len(self.signals)
                 elif len(self.signals) > early:
                     self.get_logger().warning('a second signal: ending at once')

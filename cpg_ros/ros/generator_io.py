@@ -42,8 +42,8 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 #: COMMAND_TOPICS: kind of command -> topic on which ros2_control's controllers listen by default.
 COMMAND_TOPICS = {'joint_trajectory': 'joint_trajectory_controller/joint_trajectory',
                   'forward_position': 'forward_position_controller/commands'}
-#: CELLS: period in which the cells are published, s; shorter than people can see.
-CELLS = 0.02
+#: CELLS_PERIOD: period in which the cells are published, s; shorter than people can see.
+CELLS_PERIOD = 0.02
 #: STAMPED: parameter of all nodes with topics that have no stamps.
 STAMPED = Spec(False, 'publish messages with stamps, too, where the usual ones have none',
                read_only=True)
@@ -122,7 +122,7 @@ def cells_block(node: Node, network: type[Network], state: int, stamped: bool = 
     if stamped:
         names = [f'{name}{cell + 1}' for name in network.states for cell in range(network.cells)]
         messages.append(('~/cells_stamped', joint_state(names, *np.split(np.arange(count), 2))))
-    return MessageBlock(node, [count], messages).feed(state, period=CELLS)
+    return MessageBlock(node, [count], messages).feed(state, period=CELLS_PERIOD)
 
 
 def joint_state(names: Sequence[str], *parts: np.ndarray) -> Template:
@@ -161,8 +161,8 @@ def foot_wrenches(legs: Sequence[str], places: np.ndarray, frames: Mapping[str, 
 
 # The joint angles that the robot's own driver publishes.
 
-#: FRESH: age up to which joint states count as the joints' present angles, s.
-FRESH = 1.0
+#: MAX_AGE: up to which joint states count as the joints' present angles, s.
+MAX_AGE = 1.0
 
 
 class MeasuredPose:
@@ -181,13 +181,13 @@ class MeasuredPose:
         self._subscription = PolledSubscription(node, JointState, topic, best_effort(8))
         self.topic = self._subscription.topic
 
-    def receive(self, fresh: float = FRESH) -> np.ndarray:
-        """Return each joint's angle, rad, leg by leg; nan if older than ``fresh``, s."""
+    def receive(self, max_age: float = MAX_AGE) -> np.ndarray:
+        """Return each joint's angle, rad, leg by leg; nan if older than ``max_age``, s."""
         for message, arrived in self._subscription.receive():
             for name, angle in zip(message.name, message.position, strict=False):
                 if (k := self._index.get(name)) is not None and math.isfinite(angle):
                     self._angles[k], self._arrived[k] = angle, arrived
-        return np.where(self._arrived > time.time_ns() - fresh * 1e9, self._angles, math.nan)
+        return np.where(self._arrived > time.time_ns() - max_age * 1e9, self._angles, math.nan)
 
     def lacks(self, angles: np.ndarray) -> str:
         """Return why angles are not a complete pose of the robot, or ''."""
@@ -198,16 +198,16 @@ class MeasuredPose:
 
 
 #: How often the age of the last command is checked, s.
-LOOK = 0.02
+CHECK_PERIOD = 0.02
 #: Time between two warnings of a kind, s.
-QUIET = 5.0
+WARNING_PERIOD = 5.0
 #: Frames that are the robot's base by name, beside the parameter ``feedback.base_frame``; '' is
 #: that of a publisher without frames.
-BASES = '', 'base', 'base_link', 'base_footprint'
+BASE_FRAMES = '', 'base', 'base_link', 'base_footprint'
 #: Largest speed to the side, m/s, which needs feedback.
-ASIDE = 0.2
-#: BACK: fraction of a gait's fastest speed below which the faster gait is left for it.
-BACK = 0.9
+MAX_LATERAL_SPEED = 0.2
+#: Fraction of a gait's fastest speed below which the pattern changes back to it.
+HYSTERESIS = 0.9
 
 
 class CmdVel:
@@ -249,7 +249,7 @@ class CmdVel:
             self._receive_stamped if self._stamped else self._receive, QoSProfile(depth=10),
             qos_overriding_options=OVERRIDABLE)
         # A system clock that is set must not stop the robot, nor keep it going.
-        node.create_timer(LOOK, self._check, clock=STEADY)
+        node.create_timer(CHECK_PERIOD, self._check, clock=STEADY)
 
     @property
     def walking(self) -> bool:
@@ -297,7 +297,7 @@ class CmdVel:
         """Accept a fresh command in the base's frame; a stamp of 0 counts as fresh."""
         stamp, frame = message.header.stamp, message.header.frame_id
         base = self._node.get_parameter('feedback.base_frame').value
-        if frame not in (*BASES, base):
+        if frame not in (*BASE_FRAMES, base):
             self._log.warning(f"cmd_vel ignored: it is in the frame '{frame}', not in the base's "
                               f"'{base}' (feedback.base_frame)", once=True)
             return
@@ -305,7 +305,8 @@ class CmdVel:
         if (stamp.sec or stamp.nanosec) and abs(age) > self._timeout():
             side = 'old' if age > 0.0 else 'ahead'
             self._log.warning(f'cmd_vel ignored: its stamp is {abs(age):.3g} s {side}; the clocks '
-                              'of sender and generator must agree', throttle_duration_sec=QUIET)
+                              'of sender and generator must agree',
+                              throttle_duration_sec=WARNING_PERIOD)
             return
         self._receive(message.twist)
 
@@ -314,17 +315,18 @@ class CmdVel:
         if not all(math.isfinite(value) for value in (speed, turn, aside)):
             self._log.warning(f'cmd_vel ignored: {speed} m/s forward, {aside} m/s to the left, '
                               f'{turn} rad/s are not all finite',
-                              throttle_duration_sec=QUIET)
+                              throttle_duration_sec=WARNING_PERIOD)
             return
         if aside and not self._closed():
             self._log.warning(f'cmd_vel asks for {aside:g} m/s to the left: without feedback this '
                               'robot walks forward, backward and in curves only',
-                              throttle_duration_sec=QUIET)
+                              throttle_duration_sec=WARNING_PERIOD)
             aside = 0.0
-        elif abs(aside) > ASIDE:
+        elif abs(aside) > MAX_LATERAL_SPEED:
             self._log.warning(f'cmd_vel asks for {aside:g} m/s to the left: the range is '
-                              f'{-ASIDE:g} to {ASIDE:g} m/s', throttle_duration_sec=QUIET)
-            aside = math.copysign(ASIDE, aside)
+                              f'{-MAX_LATERAL_SPEED:g} to {MAX_LATERAL_SPEED:g} m/s',
+                              throttle_duration_sec=WARNING_PERIOD)
+            aside = math.copysign(MAX_LATERAL_SPEED, aside)
         with self._deciding:
             self._target, self._when, self._stale = (speed, aside, turn), self._now(), False
             self._act()
@@ -365,7 +367,7 @@ class CmdVel:
             elif not slowest <= speed <= fastest and not self._requested:
                 self._log.warning(f"cmd_vel asks for {speed:g} m/s: the {self._plan.name}'s "
                                   f'range is {slowest:g} to {fastest:g} m/s',
-                                  throttle_duration_sec=QUIET)
+                                  throttle_duration_sec=WARNING_PERIOD)
             self._pattern.steer(*self._plan.steer(speed, turn))
         if walking != self._up:
             self._up = walking
@@ -375,7 +377,7 @@ class CmdVel:
         """Return the gait to change to for a speed, m/s, or '' to stay; each is tried once."""
         if self._plan.name == self._faster:
             slower = self._slower
-            wanted = (slower.name if slower is not None and speed < BACK * slower.speeds[1]
+            wanted = (slower.name if slower is not None and speed < HYSTERESIS * slower.speeds[1]
                       else '')
         else:
             wanted = self._faster if speed > self._plan.speeds[1] else ''

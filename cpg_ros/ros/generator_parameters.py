@@ -34,7 +34,7 @@ from cpg_ros.networks.registry import find_network, NETWORKS, with_legs_of
 from cpg_ros.ros import posture
 from cpg_ros.ros.generator_io import STAMPED
 from cpg_ros.ros.node import ticker
-from cpg_ros.ros.node.parameters import as_doubles, one_of, PRESETS, Spec, UNTUNED
+from cpg_ros.ros.node.parameters import as_doubles, one_of, PRESETS_LABEL, Spec, UNTUNED_LABEL
 from rclpy.parameter import Parameter
 
 COMMANDS = ('none', 'joint_trajectory', 'forward_position')
@@ -137,13 +137,13 @@ def gait_spec(network: type[Network], presets: Mapping[str, Preset], further: st
     """
     gaits = [name for name, preset in presets.items() if name == preset.gait]
     others = [name for name in presets if name not in gaits]
-    more = f'{PRESETS}{", ".join(others)}' if others else ''
+    more = f'{PRESETS_LABEL}{", ".join(others)}' if others else ''
     motions = robot.motions if robot else {}
     untuned = [name for name, preset in presets.items()
                if not (motion := motions.get(name) or motions.get(preset.gait))
                or motion.verdict.startswith('poor')]
     if untuned and any(motion.verdict for motion in motions.values()):
-        further += f'{UNTUNED}{", ".join(untuned)}'
+        further += f'{UNTUNED_LABEL}{", ".join(untuned)}'
     return Spec(network.usual_gait, 'gait; setting it loads its preset of network parameters',
                 constraints=one_of(gaits, more + further))
 

@@ -52,8 +52,8 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 NAME = 'cpg_inversion'
-#: PATIENCE: longest time for a generator to answer, s.
-PATIENCE = 3.0
+#: RESPONSE_TIMEOUT: longest time for a generator to answer, s.
+RESPONSE_TIMEOUT = 3.0
 
 SPECS = {
     'topics': Spec(['joint_states'], 'topics of type sensor_msgs/JointState to listen to',
@@ -242,7 +242,8 @@ class Inversion(StartedNode):
         # The fit's cells are then those of its joints.
         whole = (robot is not None and theirs == self._value('robot')
                  and robot.harmonics == result.fit.harmonics)
-        await target.set_parameters(running_parameters(result, robot if whole else None), PATIENCE)
+        await target.set_parameters(running_parameters(result, robot if whole else None),
+                                    RESPONSE_TIMEOUT)
         return whole
 
 

@@ -24,11 +24,11 @@ from cpg_ros.ros.node.health import STEADY
 import numpy as np
 from rclpy.node import Node
 
-#: PERIOD: interval at which commanded and measured angles are compared, s; FRESH: largest age of
+#: PERIOD: interval at which commanded and measured angles are compared, s; MAX_AGE: largest age of
 #: the measured angles, s.
-PERIOD, FRESH = 0.1, 0.2
-#: AGAIN: time without a fault, s, after which the joints count as following again.
-AGAIN = 3.0
+PERIOD, MAX_AGE = 0.1, 0.2
+#: RECOVERY_TIME: time without a fault, s, after which the joints count as following again.
+RECOVERY_TIME = 3.0
 
 
 class TrackingLimits(NamedTuple):
@@ -72,7 +72,7 @@ class JointTracking:
             self._monitor.reset()
             reason = ''
         else:
-            angles = self._measured.receive(FRESH)
+            angles = self._measured.receive(MAX_AGE)
             # A joint that is not measured says nothing.
             reason = self._monitor.update(
                 commanded, np.where(np.isnan(angles), commanded, angles), dt)
@@ -80,6 +80,6 @@ class JointTracking:
         if reason and not self.text:
             self.text = reason
             self._news(reason)
-        elif self.text and self._well >= AGAIN:
+        elif self.text and self._well >= RECOVERY_TIME:
             self.text = ''
             self._news('')

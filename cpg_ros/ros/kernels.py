@@ -26,15 +26,15 @@ from cpg_ros.dynamics.integration.c_kernel import is_missing
 from cpg_ros.dynamics.integration.compilation import COMPILED, on_compile
 from cpg_ros.motion.core import core, precompile
 from cpg_ros.networks.registry import find_network
-from cpg_ros.ros.node.health import START
+from cpg_ros.ros.node.health import START_STATUS
 from cpg_ros.ros.node.node_base import StartError
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.node import Node
 
 # Progress of a node that starts, on /diagnostics, where pages find it.
 
-#: EVERY: period in which the progress is published, s.
-EVERY = 1.0
+#: PROGRESS_PERIOD: period in which the progress is published, s.
+PROGRESS_PERIOD = 1.0
 
 
 class StartProgress:
@@ -50,10 +50,10 @@ class StartProgress:
 
     def _publish(self) -> None:
         name = self._node.get_fully_qualified_name()
-        while not self._ended.wait(EVERY):
+        while not self._ended.wait(PROGRESS_PERIOD):
             message = DiagnosticArray(status=[DiagnosticStatus(
-                level=DiagnosticStatus.OK, name=f'{name}: {START}', message=f'{self._what}, '
-                f'{self.passed:.0f} of about {self._seconds:.0f} s')])
+                level=DiagnosticStatus.OK, name=f'{name}: {START_STATUS}',
+                message=f'{self._what}, {self.passed:.0f} of about {self._seconds:.0f} s')])
             message.header.stamp = self._node.get_clock().now().to_msg()
             self._publisher.publish(message)
 
@@ -69,11 +69,11 @@ class StartProgress:
         self._node.destroy_publisher(self._publisher)
 
 
-#: Durations of compilation on one core of 2023, s. FEEDBACK: the kernels of the feedback; BALANCE:
-#: those of a biped's balance; NETWORK: a network in C.
-FEEDBACK, BALANCE, NETWORK = 25.0, 40.0, 2.0
+#: Durations of compilation on one core of 2023, s. FEEDBACK_TIME: the kernels of the feedback;
+#: BALANCE_TIME: those of a biped's balance; NETWORK_TIME: a network in C.
+FEEDBACK_TIME, BALANCE_TIME, NETWORK_TIME = 25.0, 40.0, 2.0
 #: How often it is seen whether a compiling process has ended, s.
-LOOK = 0.05
+POLL_PERIOD = 0.05
 
 
 def compile_kernels(network: str, node: Node) -> None:
@@ -90,7 +90,7 @@ def compile_kernels(network: str, node: Node) -> None:
     # Without a compiler it ends here.
     core()
     if is_missing(find_network(network)):
-        compile_apart(node, network, f"network '{network}'", NETWORK)
+        compile_apart(node, network, f"network '{network}'", NETWORK_TIME)
     precompile(network)
 
 
@@ -141,7 +141,7 @@ def compile_apart(node: Any, part: str, what: str, seconds: float, moving: bool 
         start_new_session=True)
     try:
         while child.poll() is None:
-            if node.stop.wait(LOOK):
+            if node.stop.wait(POLL_PERIOD):
                 raise StartError(f'the node ends while it makes the {what} ready')
         if child.returncode:
             assert child.stderr is not None

@@ -28,12 +28,13 @@ from launch_ros.parameter_descriptions import ParameterValue
 import yaml
 
 #: Type -> name of such a value in messages.
-WHAT = {int: 'a whole number', float: 'a number', bool: 'true or false', list: 'a list as [a, b]'}
+TYPE_NAMES = {int: 'a whole number', float: 'a number', bool: 'true or false',
+              list: 'a list as [a, b]'}
 #: Argument -> (default, type, what it is); each sets the parameter of the same name, but an
 #: empty one is left to the node.
 Arguments = Mapping[str, tuple[str, type, str]]
 #: Parameters of the generator that are arguments of every launch file that starts it on a robot.
-GENERATOR: Arguments = {
+GENERATOR_ARGUMENTS: Arguments = {
     'network': ('delayed', str, 'network, which must be one of the robot file'),
     'gait': ('', str, "gait to start with; empty for the network's usual one"),
     'frequency': ('', float, "strides per second [Hz]; empty for the gait's usual one"),
@@ -43,8 +44,8 @@ GENERATOR: Arguments = {
 }
 #: Arguments that have been renamed; launch itself says nothing of one that it does not know.
 RENAMED = {'feedback': 'feedback.enabled'}
-#: GIVEN: configuration with the names of the arguments that the user gave.
-GIVEN = 'cpg_ros.given'
+#: Configuration with the names of the arguments that the user set.
+USER_ARGUMENTS = 'cpg_ros.given'
 
 
 def declared(arguments: Arguments) -> list[LaunchDescriptionEntity]:
@@ -58,7 +59,7 @@ def declared(arguments: Arguments) -> list[LaunchDescriptionEntity]:
     def note(context: LaunchContext) -> None:
         # Once declared, an argument that equals its default looks the same, given or not.
         given = context.launch_configurations
-        given[GIVEN] = ' '.join(name for name in declarations if name in given)
+        given[USER_ARGUMENTS] = ' '.join(name for name in declarations if name in given)
 
     return [OpaqueFunction(function=note),
             *(DeclareLaunchArgument(name, default_value=default, description=text)
@@ -80,7 +81,7 @@ def value(context: LaunchContext, name: str, kind: type) -> Any:
         parsed = None
     origin = get_origin(kind) or kind
     if not isinstance(parsed, origin):
-        raise RuntimeError(f'{name}:={text} is not {WHAT[origin]}')
+        raise RuntimeError(f'{name}:={text} is not {TYPE_NAMES[origin]}')
     return parsed
 
 
@@ -171,7 +172,7 @@ def started(context: LaunchContext, executable: str, name: str, arguments: Argum
         if not file.is_file():
             raise RuntimeError(f'params_file:={name_of_file}: there is no such file')
         # Later values take precedence: defaults give way to the file.
-        given_names = LaunchConfiguration(GIVEN).perform(context).split()
+        given_names = LaunchConfiguration(USER_ARGUMENTS).perform(context).split()
         asked = {key: parameter for key, parameter in parameters.items() if key in given_names}
         layers = [parameters, str(file), {**asked, **(fixed or {})}]
     return Node(package='cpg_ros', executable=executable, name=name, output='screen',

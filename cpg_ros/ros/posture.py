@@ -34,23 +34,23 @@ from rclpy.qos import QoSProfile
 from std_srvs.srv import Trigger
 
 PREFIX = 'body.'
-#: ENDS: poses in which a robot may be left at the end.
-ENDS = 'stand', 'sit'
+#: END_POSES: poses in which a robot may be left at the end.
+END_POSES = 'stand', 'sit'
 SPECS = {
     f'{PREFIX}height': Spec(0.0, 'height of the body above its stand [m]; feet stay where they '
                             'are', -1.0, 1.0),
     **{f'{PREFIX}{name}': Spec(0.0, f'{name} of the body against its feet{sense} [rad]', -0.8, 0.8)
        for name, sense in (('roll', ''), ('pitch', ', positive with the nose down'), ('yaw', ''))},
     'end': Spec('stand', 'pose in which the robot is left when the node ends; sit needs up to 3 s '
-                'more', constraints=one_of(ENDS))}
-#: LOOK: period in which the node looks whether the robot has stopped, or risen, s.
-LOOK = 0.02
-#: NEAR: distance from its pose at which a body has sat down or risen, m.
-NEAR = 5e-3
-#: LAST: time in which it sits down at the end, s.
-LAST = 1.0
-#: QUIET: time between two warnings of a kind, s.
-QUIET = 5.0
+                'more', constraints=one_of(END_POSES))}
+#: CHECK_PERIOD: period in which the node looks whether the robot has stopped, or risen, s.
+CHECK_PERIOD = 0.02
+#: POSE_TOLERANCE: distance from its pose at which a body has sat down or risen, m.
+POSE_TOLERANCE = 5e-3
+#: SIT_DURATION: time in which it sits down at the end, s.
+SIT_DURATION = 1.0
+#: WARNING_PERIOD: time between two warnings of a kind, s.
+WARNING_PERIOD = 5.0
 
 
 class Posture:
@@ -80,7 +80,7 @@ class Posture:
         self._node, self._pattern, self._plan = node, pattern, plan
         self._walk, self._validate_stand, self._body = walk, validate_stand, pattern.body
         self.seated = self.walks = self._rises = False
-        self._timer = node.create_timer(LOOK, self._go_on, clock=STEADY, autostart=False)
+        self._timer = node.create_timer(CHECK_PERIOD, self._go_on, clock=STEADY, autostart=False)
         self._pose = self._asked({})
         if reason := self.validate([], plan()):
             raise InputError(reason)
@@ -135,7 +135,7 @@ class Posture:
         length, log = float(np.linalg.norm(numbers)), self._node.get_logger()
         if not (math.isfinite(length + position.z) and abs(length - 1.0) < 0.01):
             log.warning(f'body_pose ignored: z {position.z} m, orientation {numbers[1:]} {q.w} is '
-                        'not finite, or its length is not 1', throttle_duration_sec=QUIET)
+                        'not finite, or its length is not 1', throttle_duration_sec=WARNING_PERIOD)
             return
         if position.x or position.y:
             log.warning('body_pose: x and y are ignored, only z and the orientation count',
@@ -144,7 +144,7 @@ class Posture:
         if pose == self._pose:
             return
         if reason := self._reason(pose, self._plan()):
-            log.warning(f'body_pose ignored: {reason}', throttle_duration_sec=QUIET)
+            log.warning(f'body_pose ignored: {reason}', throttle_duration_sec=WARNING_PERIOD)
             return
         self._aim(pose)
 
@@ -177,7 +177,7 @@ class Posture:
     def _go_on(self) -> None:
         """Sit down once the robot stands, or walk once it is up."""
         if self._rises:
-            if np.abs(self._body.now - self._pose).max() > NEAR:
+            if np.abs(self._body.now - self._pose).max() > POSE_TOLERANCE:
                 return
             self.seated = self._rises = False
             if self.walks:
@@ -192,5 +192,5 @@ class Posture:
         """Sit down for the last time; return whether the robot sits."""
         if not self.seated or self._rises:
             self.seated, self._rises = True, False
-            self._body.go_to(self._body.seat, LAST)
-        return bool(np.abs(self._body.now - self._body.seat).max() < NEAR)
+            self._body.go_to(self._body.seat, SIT_DURATION)
+        return bool(np.abs(self._body.now - self._body.seat).max() < POSE_TOLERANCE)

@@ -123,13 +123,12 @@ class Measurements:
 
 # Lockstep: a thread in which a simulation and the node that commands it take turns.
 
-#: Longest wait for the commands of an instant, s. PATIENCE: at first; IMPATIENCE: after an instant
-#: without commands.
-PATIENCE, IMPATIENCE = 1.0, 0.02
+#: Of the wait for the commands of an instant, s; RETRY_TIMEOUT: after an instant without commands.
+COMMAND_TIMEOUT, RETRY_TIMEOUT = 1.0, 0.02
 #: Interval at which to look for commands, s.
-LOOK = 5e-5
-#: MOST_BEHIND: longest delay behind real time that is made up for, s; the rest slows the robot.
-MOST_BEHIND = 0.05
+POLL_PERIOD = 5e-5
+#: MAX_DELAY: longest delay behind real time that is made up for, s; the rest slows the robot.
+MAX_DELAY = 0.05
 
 
 class Lockstep(TickThread):
@@ -164,7 +163,7 @@ class Lockstep(TickThread):
                 announced = reason
                 logger.info(reason)
         period = round(1e9 / self.rate)
-        now, every, since, patience = 0, 1, 0, PATIENCE
+        now, every, since, timeout = 0, 1, 0, COMMAND_TIMEOUT
         started = False
         while not self._ending.is_set():
             now += period
@@ -174,12 +173,12 @@ class Lockstep(TickThread):
             if since < every:
                 if self._commands.receive():
                     every, since = since, 0
-            elif self._answered(patience):
-                since, patience, started = 0, PATIENCE, True
+            elif self._answered(timeout):
+                since, timeout, started = 0, COMMAND_TIMEOUT, True
             elif self._ending.is_set():
                 return
             elif started:
-                every, patience = since + 1, IMPATIENCE
+                every, timeout = since + 1, RETRY_TIMEOUT
                 self.count.late += 1
                 if self._commands.connected:
                     logger.warning(f'no command came for {1e-9 * now:.3f} s of simulated time: '
@@ -198,37 +197,37 @@ class Lockstep(TickThread):
         if not self._spacing:
             return
         now = time.monotonic()
-        due = max(self._due + self._spacing, now - MOST_BEHIND) if self._due else now
+        due = max(self._due + self._spacing, now - MAX_DELAY) if self._due else now
         self.count.worst = max(self.count.worst, round(1e9 * (now - due)))
         self._due = due
         if due > now:
             self._ending.wait(due - now)
 
-    def _answered(self, patience: float) -> bool:
+    def _answered(self, timeout: float) -> bool:
         """Wait for the commands; return whether they came."""
-        deadline = time.monotonic() + patience
+        deadline = time.monotonic() + timeout
         while not self._commands.receive():
             if time.monotonic() > deadline or self._ending.is_set():
                 return False
-            time.sleep(LOOK)
+            time.sleep(POLL_PERIOD)
         return True
 
 
 NAME = 'robot_sim'
 #: How long the force of one message on ~/push acts, s of simulated time.
-PUSH = 0.1
-#: DISCOVERY: time after which two nodes have usually discovered each other, s.
-DISCOVERY = 1.0
-#: SLOWEST: least real_time_factor other than 0.
-SLOWEST = 1e-3
-#: BOUNCE: time after the last instant of a fall, s, from which on the robot counts as upright.
-BOUNCE = 1.0
-#: APPROACH: duration of the way from the stand to the first commanded pose, s of simulated time.
-APPROACH = 1.0
+PUSH_DURATION = 0.1
+#: DISCOVERY_TIME: time after which two nodes have usually discovered each other, s.
+DISCOVERY_TIME = 1.0
+#: MIN_TIME_FACTOR: least real_time_factor other than 0.
+MIN_TIME_FACTOR = 1e-3
+#: Time after the last instant of a fall, s, from which on the robot counts as upright.
+RECOVERY_TIME = 1.0
+#: Of the way from the stand to the first commanded pose, s of simulated time.
+APPROACH_DURATION = 1.0
 
 #: Kinds of ground, and the friction of the last one.
 TERRAINS = ('flat', *GROUNDS, 'slippery')
-SLIPPERY = 0.3
+SLIPPERY_FRICTION = 0.3
 
 SPECS = fixed({
     'robot': Spec('unitree_go2', 'robot file, or the name of a shipped one',
@@ -258,7 +257,7 @@ SPECS = fixed({
                          '[degrees], positive uphill', -45.0, 45.0),
     'terrain_seed': Spec(0, 'seed of random terrain', 0, 2**31 - 1),
     'friction': Spec(1.0, 'coefficient of friction between feet and ground; at most '
-                     f'{SLIPPERY:g} on slippery ground', 0.01, 10.0),
+                     f'{SLIPPERY_FRICTION:g} on slippery ground', 0.01, 10.0),
     'payload': Spec(0.0, 'mass added to the base [kg]', 0.0, 1e3),
     'gyroscope_noise': Spec(0.0, 'standard deviation of the noise of the angular velocity in imu '
                             '[rad/s]', 0.0, 10.0),
@@ -303,8 +302,9 @@ class RobotSim(StartedNode):
             raise StartError(f'rate {self._rate:g} Hz and timestep {timestep:g} s do not match: '
                              f'a period of {1.0 / self._rate:g} s must hold a whole number '
                              'of time steps')
-        if 0.0 < factor < SLOWEST:
-            raise StartError(f'real_time_factor {factor:g} must be 0 or at least {SLOWEST:g}')
+        if 0.0 < factor < MIN_TIME_FACTOR:
+            raise StartError(f'real_time_factor {factor:g} must be 0 or at least '
+                             f'{MIN_TIME_FACTOR:g}')
         film, footfalls = (Path(name).expanduser() if name else None
                            for name in map(self._value, ('film', 'footfalls')))
         robot = load_robot(self._value('robot'))
@@ -320,7 +320,7 @@ class RobotSim(StartedNode):
         self._commands = Commands(self, robot, self._value('command'), 1.0 / self._rate,
                                   self._body.stand)
         self._held = HeldSubscription(self, robot) if robot.held else None
-        self._approach = Approach(round(APPROACH / timestep), self._body.stand,
+        self._approach = Approach(round(APPROACH_DURATION / timestep), self._body.stand,
                                   robot.leg_of_joint[robot.order_indices])
         sensors = SimulatedSensors(self._body, 1.0 / self._rate, SensorNoise(
             self._value('imu_delay'), seed=self._value('noise_seed'), **{
@@ -375,7 +375,7 @@ class RobotSim(StartedNode):
             lay(body.model, terrain)
         friction = self._value('friction')
         if self._value('terrain') == 'slippery':
-            friction = min(friction, SLIPPERY)
+            friction = min(friction, SLIPPERY_FRICTION)
         if friction != 1.0:
             set_friction(body.model, friction)
         body.load(self._value('payload'))
@@ -397,7 +397,7 @@ class RobotSim(StartedNode):
     def _push(self, message: Wrench) -> None:
         force = np.array([message.force.x, message.force.y, message.force.z])
         if np.isfinite(force).all():
-            self._requests.append(lambda: self._body.push(force, PUSH))
+            self._requests.append(lambda: self._body.push(force, PUSH_DURATION))
         else:
             self.get_logger().warning('ignored: a push that is not finite',
                                       throttle_duration_sec=10.0)
@@ -463,7 +463,7 @@ class RobotSim(StartedNode):
                 self.get_logger().error(f'the robot has fallen: {self._summary()}; ~/reset '
                                         'stands it up')
             # Bouncing is part of the fall.
-            self._upright_from = self._now + self._rate * BOUNCE
+            self._upright_from = self._now + self._rate * RECOVERY_TIME
         elif self._fallen and self._now > self._upright_from:
             self.get_logger().info('the robot is upright again')
         self._fallen = fallen or self._now <= self._upright_from
@@ -485,7 +485,7 @@ class RobotSim(StartedNode):
         if not self.count_subscribers(clock):
             return f'waiting for a node that listens to {clock}'
         # By then another clock would have been found.
-        return 'waiting for discovery' * (time.monotonic() < self._made + DISCOVERY)
+        return 'waiting for discovery' * (time.monotonic() < self._made + DISCOVERY_TIME)
 
     # -- its health -----------------------------------------------------------------------
 

@@ -17,7 +17,7 @@
 import math
 
 from cpg_ros.ros import command_topics
-from cpg_ros.ros.command_topics import KpScaleSubscription, LARGEST_SCALE, STALE
+from cpg_ros.ros.command_topics import KpScaleSubscription, MAX_KP_SCALE, SCALE_TIMEOUT
 import pytest
 from std_msgs.msg import Float64
 
@@ -50,19 +50,19 @@ def received(monkeypatch):
 def test_servos_are_as_stiff_as_the_newest_message_says(received):
     assert received(1.0) == 1.0
     assert received(1.1, 2.0) == 2.0
-    assert received(1.1 + 0.9 * STALE) == 2.0
+    assert received(1.1 + 0.9 * SCALE_TIMEOUT) == 2.0
     assert received(1.2, 1.0) == 1.0
 
 
 def test_they_do_not_stay_stiff_when_the_generator_is_gone(received):
     assert received(1.0, 2.0) == 2.0
-    assert received(1.0 + 1.1 * STALE) == 1.0
+    assert received(1.0 + 1.1 * SCALE_TIMEOUT) == 1.0
     # Nor where time jumps back.
     assert received(2.0, 2.0) == 2.0
     assert received(1.0) == 1.0
 
 
-@pytest.mark.parametrize('scale', [0.5, -2.0, 1.1 * LARGEST_SCALE, math.nan, math.inf])
+@pytest.mark.parametrize('scale', [0.5, -2.0, 1.1 * MAX_KP_SCALE, math.nan, math.inf])
 def test_a_factor_out_of_range_counts_as_1(received, scale):
     received(1.0, 2.0)
     assert received(1.01, scale) == 1.0

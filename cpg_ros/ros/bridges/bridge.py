@@ -31,7 +31,7 @@ from cpg_ros.motion.description import read_urdf_text
 from cpg_ros.motion.robot import Robot
 from cpg_ros.motion.robot_file import load_robot
 from cpg_ros.ros.bridges.robot_state import BridgeSettings, JointCommand, RobotState
-from cpg_ros.ros.bridges.supervisor import ACTIVE, BridgeState, Supervisor
+from cpg_ros.ros.bridges.supervisor import ACTIVE_STATES, BridgeState, Supervisor
 from cpg_ros.ros.bridges.watchdog_link import (
     address,
     listening,
@@ -45,7 +45,7 @@ from cpg_ros.ros.command_topics import (
     KINDS,
     KpScaleSubscription,
 )
-from cpg_ros.ros.node.health import Health, HealthPublisher, NAMELESS, others_on, STEADY
+from cpg_ros.ros.node.health import Health, HealthPublisher, others_on, STEADY, UNKNOWN_NODE
 from cpg_ros.ros.node.node_base import StartedNode, StartError, termination_signals
 from cpg_ros.ros.node.parameters import fixed, Spec
 from cpg_ros.ros.node.polled import command_qos, latched_text, PolledSubscription
@@ -110,19 +110,19 @@ class StartSequence(threading.Thread):
             raise StartRefused(self._reason)
 
 
-#: REST: time in damping, s, after which the robot is at rest and the bridge may end.
-REST = 1.0
-#: CHECK: period in which the graph is checked for others who command the robot, s.
-CHECK = 0.1
-#: STATE: longest time that a start waits for the first robot state, s.
-STATE = 10.0
-#: DISCOVERY: time after which two programs on a network have discovered each other, s.
-DISCOVERY = 1.0
-#: FORGOTTEN: time after which the graph no longer lists a bridge that was killed, s.
-FORGOTTEN = 25.0
-#: ONE_PRESS: time, s, within which signals count as one: Ctrl-C in a terminal signals the launch
-#: process as well, which sends the signal again.
-ONE_PRESS = 0.5
+#: REST_TIME: time in damping, s, after which the robot is at rest and the bridge may end.
+REST_TIME = 1.0
+#: CHECK_PERIOD: period in which the graph is checked for others who command the robot, s.
+CHECK_PERIOD = 0.1
+#: STATE_TIMEOUT: longest time that a start waits for the first robot state, s.
+STATE_TIMEOUT = 10.0
+#: DISCOVERY_TIME: time after which two programs on a network have discovered each other, s.
+DISCOVERY_TIME = 1.0
+#: LEASE_TIMEOUT: time after which the graph no longer lists a bridge that was killed, s.
+LEASE_TIMEOUT = 25.0
+#: DEBOUNCE_TIME: time, s, within which signals count as one: Ctrl-C in a terminal signals the
+#: launch process as well, which sends the signal again.
+DEBOUNCE_TIME = 0.5
 
 
 class BridgeNode(StartedNode):
@@ -211,7 +211,7 @@ class BridgeNode(StartedNode):
         self.create_service(Trigger, '~/start', self._start_again)
         self._before = 0, 0, 0
         self._health = HealthPublisher(self, 'robot', self.robot.name, self._report_health)
-        self._timer = self.create_timer(CHECK, self._check_graph, clock=STEADY)
+        self._timer = self.create_timer(CHECK_PERIOD, self._check_graph, clock=STEADY)
         self._warn_of_unknown()
 
     def _common_settings(self) -> dict[str, float]:
@@ -374,7 +374,7 @@ class BridgeNode(StartedNode):
     def _resting(self, now: float) -> bool:
         state = self.supervisor.state
         return state is BridgeState.IDLE or (state is BridgeState.DAMPING
-                                             and self.supervisor.time_in_state(now) > REST)
+                                             and self.supervisor.time_in_state(now) > REST_TIME)
 
     # -- start ----------------------------------------------------------------------------
 
@@ -394,11 +394,11 @@ class BridgeNode(StartedNode):
         self.get_logger().info(f'start: {text}')
 
     def _await_state(self, wait: Wait) -> None:
-        end = time.monotonic() + STATE
+        end = time.monotonic() + STATE_TIMEOUT
         while not self.received:
             if time.monotonic() > end:
                 name = self.interface.state_type().__name__
-                raise StartRefused(f'no {name} for {STATE:g} s{self.state_hint}')
+                raise StartRefused(f'no {name} for {STATE_TIMEOUT:g} s{self.state_hint}')
             wait(0.02)
         self.log_step('receiving robot state')
 
@@ -410,7 +410,7 @@ class BridgeNode(StartedNode):
     def _check_publishers(self, wait: Wait) -> None:
         if self._hazard:
             raise StartRefused(self._hazard)
-        end, logged = time.monotonic() + FORGOTTEN, False
+        end, logged = time.monotonic() + LEASE_TIMEOUT, False
         while (conflict := self._find_conflict())[0]:
             text, of_one_name = conflict
             if not of_one_name or time.monotonic() > end:
@@ -425,7 +425,7 @@ class BridgeNode(StartedNode):
         if self.watchdog is not None and (refusal := self.watchdog.start()):
             raise StartRefused(refusal)
         # Let the robot discover this publisher before it is needed.
-        wait(DISCOVERY)
+        wait(DISCOVERY_TIME)
 
     def _rise(self, wait: Wait) -> None:
         """Request the robot to stand up, on the thread that commands."""
@@ -448,7 +448,7 @@ class BridgeNode(StartedNode):
     def _stop(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         """Sit down, then damp, in any state."""
         state = self.supervisor.state
-        message = ('it sits down, then damps' if state in ACTIVE else
+        message = ('it sits down, then damps' if state in ACTIVE_STATES else
                    'the start is cancelled' if self._start is not None else f'it is {state.value}')
         # Cancel here, not in the loop's thread, which might cancel a start that is requested
         # later.
@@ -471,7 +471,7 @@ class BridgeNode(StartedNode):
             self._requests.append(self.supervisor.stand)
             response.success, response.message = True, 'it follows targets from now on'
             return response
-        if state in ACTIVE or self._start is not None or self._ending:
+        if state in ACTIVE_STATES or self._start is not None or self._ending:
             response.message = ('it is being started already' if self._start is not None else
                                 f'it is {state.value}')
             return response
@@ -485,11 +485,11 @@ class BridgeNode(StartedNode):
             self._hazard = hazard
             self.get_logger().error(hazard)
         before, (self._conflict, _) = self._conflict, self._find_conflict()
-        if self._conflict and self.supervisor.state in ACTIVE:
+        if self._conflict and self.supervisor.state in ACTIVE_STATES:
             reason = self._conflict
             self._requests.append(lambda now: self.supervisor.sit(now, reason))
         # The name of a node may be known later than its publisher.
-        if self._conflict and self._conflict != before and NAMELESS in before:
+        if self._conflict and self._conflict != before and UNKNOWN_NODE in before:
             self.get_logger().error(self._conflict)
 
     def _find_conflict(self) -> tuple[str, bool]:
@@ -556,7 +556,7 @@ class BridgeNode(StartedNode):
         """Sit down, damp and end at a signal; damp at once at a second one."""
         name, now = signal.Signals(number).name, time.monotonic()
         again, self._ending = self._ending, True
-        if again and now < self._ended_at + ONE_PRESS:
+        if again and now < self._ended_at + DEBOUNCE_TIME:
             return
         self._ended_at = now
         self._requests.append(lambda now: self._halt(f'{name} again', now) if again

@@ -204,8 +204,8 @@ class BridgeSettings(ShortRepr):
     tracking_time: float = 1.0
 
 
-#: HELD_SPEED: largest speed of the commanded angle of a joint that is held, rad/s.
-HELD_SPEED = 5.0
+#: MAX_HELD_SPEED: largest speed of the commanded angle of a joint that is held, rad/s.
+MAX_HELD_SPEED = 5.0
 
 
 def check_joints(robot: Robot, joints: tuple[str, ...], whose: str) -> None:
@@ -233,7 +233,7 @@ def settings_for(robot: Robot, joints: tuple[str, ...], *, kp: np.ndarray, kd: n
     ``BridgeSettings``.
     """
     driven = {joint.name: joint for joint in robot.joints}
-    rows = [(-math.inf, math.inf, HELD_SPEED, robot.held[name]) if name in robot.held else
+    rows = [(-math.inf, math.inf, MAX_HELD_SPEED, robot.held[name]) if name in robot.held else
             (driven[name].lower, driven[name].upper, driven[name].velocity, driven[name].offset)
             for name in joints]
     lower, upper, velocity, stand = np.array(rows, dtype=float).T

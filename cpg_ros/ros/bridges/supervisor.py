@@ -67,11 +67,11 @@ class SafetyChecks:
 
 # The target angles of a generator, interpolated from one to the next.
 
-#: LEAP: largest jump of a target, rad, beyond the distance that the joint's speed limit allows in
-#: the time since the last target.
-LEAP = 0.05
-#: LONGEST: longest time between two targets, s, that is interpolated and that counts for LEAP.
-LONGEST = 0.05
+#: MAX_JUMP: largest jump of a target, rad, beyond the distance that the joint's speed limit allows
+#: in the time since the last target.
+MAX_JUMP = 0.05
+#: MAX_GAP: longest time between two targets, s, that is interpolated and that counts for MAX_JUMP.
+MAX_GAP = 0.05
 
 
 class Targets:
@@ -109,14 +109,14 @@ class Targets:
         gap, self._received = now - self._received, now
         target = np.minimum(np.maximum(target, self._lower), self._upper)
         if self.accepted > -np.inf:
-            leap = np.abs(target - self._to) - self._velocity * min(gap, LONGEST) - LEAP
+            leap = np.abs(target - self._to) - self._velocity * min(gap, MAX_GAP) - MAX_JUMP
             worst = int(leap.argmax())
             if not leap[worst] <= 0.0:
                 self.rejection = (f'the target of {self._names[worst]} leapt by '
                                   f'{abs(target[worst] - self._to[worst]):.2f} rad')
                 return
             self._from = self.at(now)
-            self._span = min(gap, LONGEST) if gap > 1.5 * self._period else 0.0
+            self._span = min(gap, MAX_GAP) if gap > 1.5 * self._period else 0.0
         self._to, self._began, self.accepted, self.rejection = target, now, now, ''
 
     def at(self, now: float) -> np.ndarray:
@@ -133,11 +133,11 @@ class Targets:
 
 # Monitoring of how far joints are from their commanded angles.
 
-#: A joint is stuck if it moves by less than FOLLOWS of the range that it is commanded, while that
-#: is more than MOVES, rad, in two windows of ``tracking_time`` that follow one another.
-FOLLOWS, MOVES = 0.2, 0.08
-#: FRESH: largest age of the measured angles that are compared, s.
-FRESH = 0.2
+#: A joint is stuck if it moves by less than MIN_TRACKING of the range that it is commanded, while
+#: that is more than MIN_RANGE, rad, in two windows of ``tracking_time`` that follow one another.
+MIN_TRACKING, MIN_RANGE = 0.2, 0.08
+#: MAX_AGE: largest age of the measured angles that are compared, s.
+MAX_AGE = 0.2
 
 
 class TrackingMonitor:
@@ -192,15 +192,15 @@ class TrackingMonitor:
         self._window += dt
         if self._window >= settings.tracking_time and math.isfinite(settings.tracking_error):
             commanded, measured = self._high - self._low
-            before, self._still = self._still, (commanded > MOVES) & (
-                measured < FOLLOWS * commanded)
+            before, self._still = self._still, (commanded > MIN_RANGE) & (
+                measured < MIN_TRACKING * commanded)
             self._stuck = self._still & before
             self._begin_window()
         if not self._stuck.any():
             return ''
         joint = int(self._stuck.argmax())
         return (f'{settings.names[joint]} is stuck at {angles[1, joint]:.2f} rad: it moves by '
-                f'less than {FOLLOWS:g} of the range that it is commanded')
+                f'less than {MIN_TRACKING:g} of the range that it is commanded')
 
 
 class BridgeState(Enum):
@@ -215,13 +215,13 @@ class BridgeState(Enum):
     DAMPING = 'damping'
 
 
-#: ACTIVE: states in which the bridge holds the joints at target angles.
-ACTIVE = (BridgeState.RISING, BridgeState.HANGING, BridgeState.STANDING, BridgeState.FOLLOWING,
-          BridgeState.SITTING)
+#: ACTIVE_STATES: states in which the bridge holds the joints at target angles.
+ACTIVE_STATES = (BridgeState.RISING, BridgeState.HANGING, BridgeState.STANDING,
+                 BridgeState.FOLLOWING, BridgeState.SITTING)
 
-#: STALE: number of periods without a measurement after which the last command is held, as the
-#: torque that another angle would cause is unknown.
-STALE = 2.5
+#: STALE_PERIODS: number of periods without a measurement after which the last command is held, as
+#: the torque that another angle would cause is unknown.
+STALE_PERIODS = 2.5
 
 
 def _between(start: np.ndarray, end: np.ndarray, fraction: float) -> np.ndarray:
@@ -271,7 +271,7 @@ class Supervisor:
 
     def rise(self, now: float) -> str:
         """Begin to move the joints to the stand; return why not, or ''."""
-        if self.state in ACTIVE:
+        if self.state in ACTIVE_STATES:
             return f'it is {self.state.value} already'
         self._checks.reset()
         self._before = now
@@ -307,14 +307,14 @@ class Supervisor:
 
         A gait whose targets still arrive fades to the stand first.
         """
-        if self.state in ACTIVE and self.state is not BridgeState.SITTING:
+        if self.state in ACTIVE_STATES and self.state is not BridgeState.SITTING:
             self._fades = (self.state is BridgeState.FOLLOWING and not self._gathered
                            and self.time_in_state(now) >= self._settings.approach)
             self._enter(BridgeState.SITTING, now, reason)
 
     def damp(self, now: float, reason: str) -> None:
         """Damp the joints at once; an idle robot stays idle."""
-        if self.state in ACTIVE:
+        if self.state in ACTIVE_STATES:
             self._enter(BridgeState.DAMPING, now, reason)
 
     def _enter(self, state: BridgeState, now: float, reason: str) -> None:
@@ -332,15 +332,15 @@ class Supervisor:
         if self.state is BridgeState.IDLE:
             self._before = now
             return False
-        if self.state in ACTIVE and (reason := self._fault(now)):
+        if self.state in ACTIVE_STATES and (reason := self._fault(now)):
             self.damp(now, reason)
         if self.state is BridgeState.FOLLOWING:
             self._check_targets(now)
         dt, self._before = now - self._before, now
-        if self.state is BridgeState.FOLLOWING and now - self._received < FRESH and (
+        if self.state is BridgeState.FOLLOWING and now - self._received < MAX_AGE and (
                 reason := self.tracking.update(self._at, self.robot.q, dt)):
             self.sit(now, reason)
-        if self.state in ACTIVE:
+        if self.state in ACTIVE_STATES:
             self._follow_goal(now, dt)
         if self.state is BridgeState.DAMPING:
             self.command.damp(self.damping)
@@ -388,7 +388,7 @@ class Supervisor:
         self._at = np.minimum(np.maximum(goal, self._at - step), self._at + step)
         if passed >= (settings.sit if state is BridgeState.SITTING else time):
             self._arrive(now)
-        if self.state in ACTIVE and now - self._received < STALE * settings.period:
+        if self.state in ACTIVE_STATES and now - self._received < STALE_PERIODS * settings.period:
             self._hold()
 
     def _followed(self, now: float, dt: float) -> np.ndarray:

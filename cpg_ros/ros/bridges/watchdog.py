@@ -37,23 +37,22 @@ from cpg_ros.ros.bridges.watchdog_link import (
     of_this_user,
     TickMonitor,
 )
-from cpg_ros.ros.node.console import never_wait, TO_STREAM
+from cpg_ros.ros.node.console import never_wait, STREAM_ARGUMENTS
 from cpg_ros.ros.node.polled import command_qos
 import rclpy
 from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.publisher import Publisher
 from rclpy.signals import SignalHandlerOptions
 
-#: LOOK: period in which it checks that a bridge that has not driven yet still runs, s.
-LOOK = 1.0
-#: SPARED: oom_score_adj at which the kernel spares a process when memory runs out, see proc(5).
-SPARED = '-1000'
+#: CHECK_PERIOD: period in which it checks that a bridge that has not driven yet still runs, s.
+CHECK_PERIOD = 1.0
 
 
 def spared() -> bool:
     """Ask the kernel to spare this process when memory is exhausted; return whether it agrees."""
     try:
-        Path('/proc/self/oom_score_adj').write_text(SPARED)
+        # The kernel then spares this process when memory runs out, see proc(5).
+        Path('/proc/self/oom_score_adj').write_text('-1000')
     except OSError:
         return False
     return True
@@ -103,7 +102,7 @@ def watch(listener: socket.socket, publisher: Publisher, command: JointCommand,
     lines = [listener]
     while not monitor.ended:
         wait = monitor.timeout(time.monotonic())
-        ready, _, _ = select.select(lines, [], [], LOOK if wait is None else wait)
+        ready, _, _ = select.select(lines, [], [], CHECK_PERIOD if wait is None else wait)
         for line in ready:
             if line is listener:
                 lines += accept(listener)
@@ -132,7 +131,7 @@ def main(args: list[str]) -> int:
     # Ctrl-C in the bridge's terminal is the bridge's to handle.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     never_wait(name, [])
-    rclpy.init(args=[*TO_STREAM], domain_id=domain,
+    rclpy.init(args=[*STREAM_ARGUMENTS], domain_id=domain,
                signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node(name, namespace=namespace, enable_rosout=False,
                              start_parameter_services=False, use_global_arguments=False)

@@ -30,10 +30,8 @@ import numpy as np
 
 # Connections between processes of one user on this computer, one name for each robot.
 
-#: WAITING: most connections that wait to be accepted.
-WAITING = 8
-#: BUFFER: size of the send buffer, bytes; small, so that a process that does not read is noticed.
-BUFFER = 4096
+#: BUFFER_SIZE: of the send buffer, bytes; small, so that a process that does not read is noticed.
+BUFFER_SIZE = 4096
 #: The kernel's struct ucred: process, user, group.
 _CREDENTIALS = struct.Struct('3i')
 
@@ -55,7 +53,7 @@ def unconnected() -> socket.socket:
     """Return a non-blocking socket."""
     line = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     line.setblocking(False)
-    line.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, BUFFER)
+    line.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, BUFFER_SIZE)
     return line
 
 
@@ -72,7 +70,7 @@ def listening(name: str) -> socket.socket:
     except OSError as error:
         line.close()
         raise NameTaken(_holder(name)) from error
-    line.listen(WAITING)
+    line.listen(8)
     return line
 
 
@@ -160,9 +158,9 @@ class RobotInterface:
 
 # Monitoring of a process's ticks by its watchdog.
 
-#: MISSING: number of periods after the last tick at which the bridge counts as silent: two ticks
-#: are then overdue.
-MISSING = 2.5
+#: SILENT_PERIODS: number of periods after the last tick at which the bridge counts as silent: two
+#: ticks are then overdue.
+SILENT_PERIODS = 2.5
 
 
 class TickMonitor:
@@ -220,7 +218,7 @@ class TickMonitor:
         if self._last == np.inf:
             return None
         due = self._sent + self._period if self._missing else self._last + max(
-            self._timeout, MISSING * self._period)
+            self._timeout, SILENT_PERIODS * self._period)
         return max(0.0, due - now)
 
     def due(self, now: float) -> bool:
@@ -232,10 +230,10 @@ class TickMonitor:
         return True
 
 
-#: READY: longest time for a watchdog to get ready, s, as it loads ROS.
-READY = 20.0
-#: HANGS: time without reading after which a watchdog counts as hung, s.
-HANGS = 0.5
+#: READY_TIMEOUT: longest time for a watchdog to get ready, s, as it loads ROS.
+READY_TIMEOUT = 20.0
+#: HANG_TIMEOUT: time without reading after which a watchdog counts as hung, s.
+HANG_TIMEOUT = 0.5
 #: NAME_TAKEN: exit code of a watchdog whose name another program uses.
 NAME_TAKEN = 3
 
@@ -275,7 +273,7 @@ class WatchdogLink:
             # In a session of its own: what ends the bridge or its launch file must not end it.
             self._process = subprocess.Popen(self._command, start_new_session=True,
                                              stdin=subprocess.DEVNULL)
-            end = time.monotonic() + READY
+            end = time.monotonic() + READY_TIMEOUT
             while not self._connected():
                 if (code := self._process.poll()) is not None or time.monotonic() > end:
                     return 'the watchdog does not start' + (
@@ -333,7 +331,7 @@ class WatchdogLink:
             self._socket.send(TickMonitor.tick(np.append(kd, echo)))
         except BlockingIOError:
             self._read = min(self._read, now)
-            return 'the watchdog hangs' if now - self._read > HANGS else ''
+            return 'the watchdog hangs' if now - self._read > HANG_TIMEOUT else ''
         except OSError:
             return 'the watchdog is gone'
         self._read, self._ticked = now, True
@@ -346,7 +344,7 @@ class WatchdogLink:
         """
         if self._process is None and not self._ticked:
             return
-        end = time.monotonic() + HANGS
+        end = time.monotonic() + HANG_TIMEOUT
         while time.monotonic() < end:
             try:
                 self._socket.send(TickMonitor.END)

@@ -40,9 +40,8 @@ if TYPE_CHECKING:
     from cpg_ros.ros.node.client import NodeClient
     from rclpy.node import Node
 
-#: PATIENCE: longest time for a node to answer a completion, s: DDS repeats a lost announcement
-#: only after 3 s.
-PATIENCE = 4.0
+#: COMPLETION_TIMEOUT: of a node's answer, s: DDS repeats a lost announcement only after 3 s.
+COMPLETION_TIMEOUT = 4.0
 
 
 class NoCompletion(CpgError):
@@ -88,7 +87,7 @@ def _of_node(args: Namespace, query: Callable[['NodeClient'], Coroutine[Any, Any
              ) -> list[Any]:
     from cpg_ros.ros.node.client import NodeClient, ServiceClients
     return _completed(lambda node: asyncio.run(
-        query(NodeClient(ServiceClients(node, PATIENCE), args.node))))
+        query(NodeClient(ServiceClients(node, COMPLETION_TIMEOUT), args.node))))
 
 
 def complete_parameters(parsed_args: Namespace, **_: Any) -> list[str]:
@@ -131,25 +130,25 @@ eval "$(cpg completion)" makes the shell complete all of it, parameters and topi
 exit codes: 0 done, 1 refused, or nothing answered in time, 2 wrong arguments."""
 
 
-#: NODE: node that actions address by default; WAIT: longest time to find it, s; ANSWER: longest
-#: time for its answer, s, as a setting of the generator may compile a network first.
-NODE, WAIT, ANSWER = '/cpg_generator', 5.0, 60.0
+#: DEFAULT_NODE: of actions; DISCOVERY_TIMEOUT: to find it, s; RESPONSE_TIMEOUT: of its answer, s,
+#: as a setting of the generator may compile a network first.
+DEFAULT_NODE, DISCOVERY_TIMEOUT, RESPONSE_TIMEOUT = '/cpg_generator', 5.0, 60.0
 
 
 def _common(node: str, wait: float | str) -> Parser:
     options = Parser(add_help=False)
     options.add_argument('--node', default=node, metavar='NAME',
-                      help=f'node to talk to (default: {NODE})')
+                      help=f'node to talk to (default: {DEFAULT_NODE})')
     options.add_argument('--wait', type=number, default=wait, metavar='S',
                       help='how long a node, or the publisher of a topic, is waited for, s '
-                      f'(default: {WAIT:g})')
+                      f'(default: {DISCOVERY_TIMEOUT:g})')
     return options
 
 
 def parser() -> Parser:
     """Return the arguments of the executable."""
     top = Parser(prog='cpg', description=DESCRIPTION, epilog=EPILOG,
-                  parents=[_common(NODE, WAIT)])
+                  parents=[_common(DEFAULT_NODE, DISCOVERY_TIMEOUT)])
     actions = top.add_subparsers(dest='action', required=True, metavar='ACTION')
     # Without defaults, which would replace what stands before the action.
     anywhere = _common(SUPPRESS, SUPPRESS)
@@ -246,7 +245,7 @@ def _called(args: Namespace, node: 'Node') -> str:
     from cpg_ros.ros.node.client import CallError, NodeClient, NoService, ServiceClients
     if args.action == 'call' and '/' in args.service:
         args.node, _, args.service = args.service.rpartition('/')
-    running = 'is a generator running?' if args.node == NODE else 'is it running?'
+    running = 'is a generator running?' if args.node == DEFAULT_NODE else 'is it running?'
     services = ServiceClients(node, search=args.wait, late=lambda: note(
         'cpg', f'waiting for {args.node} ({running})'))
     other = NodeClient(services, args.node)
@@ -260,17 +259,17 @@ async def _call(args: Namespace, other: 'NodeClient') -> str:
     from cpg_ros.ros.node.client import CallError
     from std_srvs.srv import SetBool, Trigger
     if args.action in ('enable', 'disable'):
-        return await other.command(SetBool, 'enable', ANSWER,
+        return await other.command(SetBool, 'enable', RESPONSE_TIMEOUT,
                                    data=args.action == 'enable')
     if 'service' in args:
-        return await other.command(Trigger, args.service, ANSWER)
+        return await other.command(Trigger, args.service, RESPONSE_TIMEOUT)
     if args.action == 'play-schedule':
         from cpg_ros.ros.cli.graph import play_schedule
         return await play_schedule(args.schedule, other, args.rate)
     if args.action == 'gait':
         args.what, args.parameter, args.value = 'set', 'gait', args.gait
     if args.what == 'set':
-        await other.set_parameters({args.parameter: args.value}, ANSWER)
+        await other.set_parameters({args.parameter: args.value}, RESPONSE_TIMEOUT)
         return f'{other.name}: {args.parameter} is {args.value}'
     if args.what == 'get':
         value, = await other.values([args.parameter])

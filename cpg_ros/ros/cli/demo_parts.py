@@ -183,18 +183,18 @@ class Interruption:
                 raise DemoError(f'a node ended with exit code {node.returncode}')
 
 
-#: DRIVEN: gaits in which a robot of one's own is driven, if its network has them.
-DRIVEN = ('trot', 'walk', 'tripod', 'wave')
-#: Durations on a machine of 2023, s. MADE: of making a robot file; BESIDES: fixed part of a gait's
-#: tuning; PLANNED: part of each design that runs on one core; SIMULATED: part that is divided by
-#: the number of cores.
-MADE, BESIDES, PLANNED, SIMULATED = 5.0, 30.0, 0.3, 0.6
+#: TOUR_GAITS: gaits in which a robot of one's own is driven, if its network has them.
+TOUR_GAITS = ('trot', 'walk', 'tripod', 'wave')
+#: Durations on a machine of 2023, s. MAKE_TIME: of making a robot file; TUNE_OVERHEAD: fixed part
+#: of a gait's tuning; PLAN_TIME: part of each design that runs on one core; SIMULATION_TIME: part
+#: that is divided by the number of cores.
+MAKE_TIME, TUNE_OVERHEAD, PLAN_TIME, SIMULATION_TIME = 5.0, 30.0, 0.3, 0.6
 #: EVALUATIONS: number of designs that are tried for each gait.
 EVALUATIONS = 120
 #: SERVO_GAINS: options of gains, which the simulation takes as well.
 SERVO_GAINS = 'kp', 'kd'
-#: PATIENCE: longest time for a stopped step to end, s.
-PATIENCE = 10.0
+#: STOP_TIMEOUT: longest time for a stopped step to end, s.
+STOP_TIMEOUT = 10.0
 
 
 class StepFailed(CpgError):
@@ -305,7 +305,7 @@ def _end(process: subprocess.Popen) -> None:
             with suppress(ProcessLookupError):
                 os.killpg(process.pid, number_of)
             with suppress(subprocess.TimeoutExpired):
-                process.wait(PATIENCE)
+                process.wait(STOP_TIMEOUT)
 
 
 def prepare(args: Namespace, steps: Steps) -> DemoRobot:
@@ -328,7 +328,7 @@ def prepare(args: Namespace, steps: Steps) -> DemoRobot:
             options += ['--forward', args.forward]
         if args.legs:
             options += ['--legs', *args.legs]
-        code = steps.run(f'making {file} from {source[1]}', MADE,
+        code = steps.run(f'making {file} from {source[1]}', MAKE_TIME,
                           ['check_robot', *source, '--make', str(file), *options])
         if not file.exists():
             raise StepFailed(code)
@@ -337,7 +337,7 @@ def prepare(args: Namespace, steps: Steps) -> DemoRobot:
         _again(tuned, file, 'evaluations', args)
     else:
         own = NETWORKS[robot.networks[0]].gaits()
-        gaits = args.tour or [gait for gait in DRIVEN if gait in own]
+        gaits = args.tour or [gait for gait in TOUR_GAITS if gait in own]
         _tune(args, steps, (file, tuned), gaits)
     robot = load_robot(str(tuned))
     gaits, steered = _ranked(robot.motions)
@@ -366,7 +366,7 @@ def _tune(args: Namespace, steps: Steps, files: tuple[Path, Path], gaits: Sequen
     source, evaluations = str(args.urdf or args.mjcf), args.evaluations or EVALUATIONS
     gains = [word for name in SERVO_GAINS if (gain := getattr(args, name)) is not None
              for word in (f'--{name}', f'{gain:g}')]
-    seconds = BESIDES + evaluations * (PLANNED + SIMULATED / (os.cpu_count() or 1))
+    seconds = TUNE_OVERHEAD + evaluations * (PLAN_TIME + SIMULATION_TIME / (os.cpu_count() or 1))
     codes = []
     for gait in gaits:
         codes.append(steps.run(

@@ -27,9 +27,7 @@ from typing import NoReturn
 from cpg_ros.common.errors import MissingLibraryError, needed
 
 #: The signals by which users, terminals and launch files end a process.
-ENDINGS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT
-#: INDEX: folder in which an installation of ROS lists its packages.
-INDEX = 'share/ament_index/resource_index/packages'
+TERMINATION_SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT
 #: Executable -> module whose ``main`` it runs.
 EXECUTABLES = {'generator': 'ros.generator', 'robot_sim': 'ros.robot_sim',
                'unitree_bridge': 'ros.bridges.unitree.bridge',
@@ -59,10 +57,10 @@ def start(name: str) -> int:
         os._exit(128 + number)
 
     # Nodes handle SIGINT also where a script starts them in the background, as launch files may.
-    before = {number: signal.signal(number, leave) for number in ENDINGS
+    before = {number: signal.signal(number, leave) for number in TERMINATION_SIGNALS
               if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN}
     # ROS from wheels finds its parts below the environment that they were installed into.
-    if (Path(sys.prefix) / INDEX / 'cpg_ros').exists():
+    if Path(sys.prefix, 'share/ament_index/resource_index/packages/cpg_ros').exists():
         os.environ.setdefault('AMENT_PREFIX_PATH', sys.prefix)
     try:
         main = import_module(f'cpg_ros.{EXECUTABLES[name]}').main

@@ -29,8 +29,8 @@ from cpg_ros.common.errors import CpgError, InputError
 from cpg_ros.fitting.inversion.gait_schedule import Entry, GaitSchedule, read_schedule
 from cpg_ros.fitting.recordings.bag_storage import opened
 from cpg_ros.fitting.recordings.recording import RecordingError
-from cpg_ros.ros.bag_recorder import BagRecorder, EVERY
-from cpg_ros.ros.node.client import NodeClient, SILENCE
+from cpg_ros.ros.bag_recorder import BagRecorder, POLL_PERIOD
+from cpg_ros.ros.node.client import NodeClient, NOTICE_DELAY
 from cpg_ros.ros.node.message_block import message_class
 from cpg_ros.ros.node.polled import best_effort, latched, PolledSubscription
 import numpy as np
@@ -44,7 +44,7 @@ import yaml
 # Publishing the messages of a bag, as ``ros2 bag play`` does.
 
 #: How long a player waits for listeners, s.
-PATIENCE = 1.0
+SUBSCRIBER_TIMEOUT = 1.0
 
 
 def play(node: Node, path: Path, topics: Sequence[str] = (), rate: float = 1.0) -> Counter[str]:
@@ -83,7 +83,7 @@ def play(node: Node, path: Path, topics: Sequence[str] = (), rate: float = 1.0) 
 
 def _wait_for_listeners(node: Node, publishers: Sequence[Publisher]) -> None:
     """Wait briefly for subscribers, so that they receive the first messages."""
-    end = time.monotonic() + PATIENCE
+    end = time.monotonic() + SUBSCRIBER_TIMEOUT
     while time.monotonic() < end and not all(
             publisher.get_subscription_count() for publisher in publishers):
         rclpy.spin_once(node, timeout_sec=0.02)
@@ -101,8 +101,8 @@ def _publisher(node: Node, connection: Connection) -> Publisher:
 
 #: How often the graph is searched for new topics, s.
 SEARCH_PERIOD = 0.5
-#: USUAL: topics of every node, which are not recorded unless they are named.
-USUAL = ('/rosout', '/parameter_events')
+#: COMMON_TOPICS: topics of every node, which are not recorded unless they are named.
+COMMON_TOPICS = ('/rosout', '/parameter_events')
 
 
 def record(node: Node, path: Path, topics: Sequence[str]) -> BagRecorder:
@@ -126,7 +126,7 @@ def record(node: Node, path: Path, topics: Sequence[str]) -> BagRecorder:
                 for topic in _subscribed(node, recorder, names):
                     print(f'recording {topic}', file=sys.stderr, flush=True)
             recorder.poll()
-            time.sleep(EVERY)
+            time.sleep(POLL_PERIOD)
     finally:
         recorder.close()
     return recorder
@@ -136,14 +136,14 @@ def _subscribed(node: Node, recorder: BagRecorder, topics: Sequence[str]) -> lis
     """Record topics that are new on the graph; return them."""
     return [topic for topic, kinds in node.get_topic_names_and_types()
             if topic not in recorder.counts and topic not in recorder.passed_over
-            and (topic in topics if topics else topic not in USUAL)
+            and (topic in topics if topics else topic not in COMMON_TOPICS)
             and node.count_publishers(topic) and recorder.subscribe(topic, kinds[0])]
 
 
 # Schedules: parameters of a running generator, set at given times.
 
-#: ANSWER: longest time for a setting, s, as a network may have to be compiled.
-ANSWER = 60.0
+#: RESPONSE_TIMEOUT: longest time for a setting, s, as a network may have to be compiled.
+RESPONSE_TIMEOUT = 60.0
 
 
 async def play_schedule(path: Path, other: NodeClient, rate: float) -> str:
@@ -163,7 +163,7 @@ async def play_schedule(path: Path, other: NodeClient, rate: float) -> str:
     for entry in schedule.entries:
         # Nothing else happens on this loop.
         await asyncio.sleep(max(began + entry.at / rate - time.monotonic(), 0.0))
-        await other.set_parameters(entry.parameters, ANSWER)
+        await other.set_parameters(entry.parameters, RESPONSE_TIMEOUT)
         say(f'{entry.at:8.2f} s  {_words(entry)}')
     return f'{other.name} goes on with the last entry'
 
@@ -184,11 +184,11 @@ def _words(entry: Entry) -> str:
                      for name, value in entry.parameters.items())
 
 
-#: DISCOVERY: time without a new topic after which topics are listed, s.
-DISCOVERY = 1.0
-#: COUNT: time for which messages are counted, s; COUNT_PERIOD: period in which they are taken, s;
-#: DEPTH: most messages that wait until then.
-COUNT, COUNT_PERIOD, DEPTH = 3.0, 0.02, 1000
+#: DISCOVERY_TIME: time without a new topic after which topics are listed, s.
+DISCOVERY_TIME = 1.0
+#: COUNT_DURATION: time for which messages are counted, s; QUEUE_DEPTH: most messages that wait
+#: until they are taken.
+COUNT_DURATION, QUEUE_DEPTH = 3.0, 1000
 
 
 class SilentTopic(CpgError):
@@ -201,11 +201,11 @@ def topics(node: Node) -> dict[str, str]:
     """Return the topics that have publishers or subscribers, and their types, sorted.
 
     They are found one after another, slowly on a loaded machine: it waits until none has come for
-    ``DISCOVERY``.
+    ``DISCOVERY_TIME``.
     """
     found: list[tuple[str, list[str]]] = []
     changed = time.monotonic()
-    while (now := time.monotonic()) < changed + DISCOVERY:
+    while (now := time.monotonic()) < changed + DISCOVERY_TIME:
         if (new := node.get_topic_names_and_types()) != found:
             found, changed = new, now
         time.sleep(0.02)
@@ -220,14 +220,14 @@ class Topic:
         """Find a topic's type and subscribe; relative names are in the namespace /.
 
         It waits up to ``wait`` s each for a publisher and the first message; ``late`` is called
-        once with the topic's name if neither has come within ``SILENCE``.
+        once with the topic's name if neither has come within ``NOTICE_DELAY``.
 
         Raises:
             SilentTopic: it has no publisher.
 
         """
         began = time.monotonic()
-        self._end, self._silence = began + wait, began + SILENCE
+        self._end, self._silence = began + wait, began + NOTICE_DELAY
         self._late = late
         self._name = topic = node.resolve_topic_name(name)
         while not (publishers := node.get_publishers_info_by_topic(topic)):
@@ -238,7 +238,7 @@ class Topic:
         kept = {publisher.qos_profile.durability for publisher in publishers}
         quality = latched if kept == {DurabilityPolicy.TRANSIENT_LOCAL} else best_effort
         self._subscription = PolledSubscription(
-            node, message_class(publishers[0].topic_type), name, quality(DEPTH),
+            node, message_class(publishers[0].topic_type), name, quality(QUEUE_DEPTH),
             overridable=False)
 
     def messages(self) -> Iterator[Any]:
@@ -258,21 +258,21 @@ class Topic:
             if silent:
                 self._pause()
             else:
-                time.sleep(COUNT_PERIOD)
+                time.sleep(POLL_PERIOD)
 
     def _pause(self) -> None:
         if time.monotonic() > self._silence:
             self._late(self._name)
             self._silence = np.inf
-        time.sleep(COUNT_PERIOD)
+        time.sleep(POLL_PERIOD)
 
     def rate(self) -> float:
         """Count messages for a while; return their rate, Hz."""
-        count, end = 0, time.monotonic() + COUNT
+        count, end = 0, time.monotonic() + COUNT_DURATION
         while time.monotonic() < end:
-            time.sleep(COUNT_PERIOD)
+            time.sleep(POLL_PERIOD)
             count += sum(1 for _ in self._subscription.receive())
-        return count / COUNT
+        return count / COUNT_DURATION
 
 
 def as_yaml(message: Any) -> str:

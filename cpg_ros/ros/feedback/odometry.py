@@ -25,10 +25,7 @@ from rclpy.node import Node
 
 # Messages of odometry: nav_msgs/Odometry and, where tf2_msgs is installed, the transform.
 
-#: Sizes. POSE: of a position; ORIENTATION: of a quaternion w x y z; TWIST: of a twist; COVARIANCE:
-#: of a covariance of pose or twist.
-POSE, ORIENTATION, TWIST, COVARIANCE = 3, 4, 6, 36
-#: PERIOD: period in which odometry and transform are published, s.
+#: Period in which odometry and transform are published, s.
 PERIOD = 0.02
 
 
@@ -81,7 +78,7 @@ def odometry_block(node: Node, source: Odometry, topic: str, frames: tuple[str, 
         fraction: of all corrections, (1,), without which nothing is published.
 
     """
-    sizes = POSE, ORIENTATION, TWIST, COVARIANCE, COVARIANCE
+    sizes = 3, 4, 6, 36, 36
     parts = indices(sizes)
     messages = [odometry(topic, frames, *parts)]
     if transforms and has_transforms():

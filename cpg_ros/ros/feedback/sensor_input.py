@@ -46,13 +46,12 @@ __all__ = ['CONTACTS', 'JointLayout', 'SensorInput', 'legs_of']
 
 # Finds the numbers in messages that were taken as bytes.
 
-#: HEADER: bytes of the encapsulation; fields are aligned relative to its end. DOUBLE: bytes of a
-#: double.
-HEADER, DOUBLE = 4, 8
-#: WRENCH: number of values of a Wrench.
-WRENCH = 6
-#: Limits of joints that are held. TURNED: of the angle, rad; SWUNG: of the speed, rad/s.
-TURNED, SWUNG = 2.0 * math.pi, 20.0
+#: HEADER_SIZE, bytes: of the encapsulation; fields are aligned relative to its end. DOUBLE, bytes.
+HEADER_SIZE, DOUBLE = 4, 8
+#: Number of values of a Wrench.
+WRENCH_SIZE = 6
+#: Limits of joints that are held. MAX_ANGLE: of the angle, rad; MAX_SPEED: of the speed, rad/s.
+MAX_ANGLE, MAX_SPEED = 2.0 * math.pi, 20.0
 
 
 class JointLayout:
@@ -74,7 +73,7 @@ class JointLayout:
         self.wrong = f'no joint {missing[0]}, or more than one' if missing else ''
         self.indices = np.array([] if missing else [names.index(name) for name in joints], int)
         self.same = [(1, 2)]
-        end = HEADER + 8
+        end = HEADER_SIZE + 8
 
         def keep(size: int) -> None:
             nonlocal end
@@ -87,7 +86,7 @@ class JointLayout:
 
         def align(size: int) -> None:
             nonlocal end
-            end += (HEADER - end) % size
+            end += (HEADER_SIZE - end) % size
 
         text(message.header.frame_id)
         keep(4)
@@ -208,7 +207,7 @@ class SensorInput:
         # Joints that are held are measured, too, where the robot publishes them.
         self._names, self._own = [*own, *held], len(own)
         limits = np.stack([np.append(robot.column(key), [limit] * len(held)) for key, limit in (
-            ('lower', -TURNED), ('upper', TURNED), ('velocity', SWUNG))])
+            ('lower', -MAX_ANGLE), ('upper', MAX_ANGLE), ('velocity', MAX_SPEED))])
         self.sensor_data = SensorData.zeros(1, len(self._legs), len(self._names))
         self.sensor_data.joint_positions[0] = [*robot.column('offset'), *held.values()]
         self.sensor_data.acceleration[0, 2] = 9.81
@@ -236,11 +235,11 @@ class SensorInput:
             struct.stamp, struct.news = (part[k:].ctypes.data
                                          for part in (senses.stamps, senses.news))
             struct.stamped = hasattr(kind, 'header')
-        self.inputs[0].expect(DOUBLE * (np.arange(IMU) - IMU), -(HEADER + DOUBLE * IMU))
+        self.inputs[0].expect(DOUBLE * (np.arange(IMU) - IMU), -(HEADER_SIZE + DOUBLE * IMU))
         for source in self.inputs[2:]:
             if contacts == WRENCHES:
-                source.expect(DOUBLE * (np.arange(FORCE_SIZE) - WRENCH),
-                              -(HEADER + DOUBLE * WRENCH))
+                source.expect(DOUBLE * (np.arange(FORCE_SIZE) - WRENCH_SIZE),
+                              -(HEADER_SIZE + DOUBLE * WRENCH_SIZE))
         self.monitors: Sequence[InputMonitor] = [source.monitor for source in self.inputs]
         self.joints = self.monitors[1]
         self._library = native.library()

@@ -38,7 +38,7 @@ from cpg_ros.ros.command_topics import held_block, kp_scale_block
 from cpg_ros.ros.feedback.loop import BalanceLoop, FeedbackLoop, Motion
 from cpg_ros.ros.feedback.odometry import odometry_block
 from cpg_ros.ros.feedback.sensor_input import SensorInput
-from cpg_ros.ros.kernels import announced, BALANCE, compile_apart, FEEDBACK
+from cpg_ros.ros.kernels import announced, BALANCE_TIME, compile_apart, FEEDBACK_TIME
 from cpg_ros.ros.node.message_block import MessageBlock
 from cpg_ros.ros.node.node_base import StartError
 from cpg_ros.ros.node.parameters import fixed, one_of, Spec
@@ -48,8 +48,8 @@ from rclpy.parameter import Parameter
 # The parameters of the feedback: its laws, their gains, and the topics it subscribes to.
 
 PREFIX = 'feedback.'
-#: ENABLED: name of the switch; FORMER: its name in earlier releases. FORMER is also the beginning
-#: of other names, which ``ros2 param dump`` cannot nest.
+#: ENABLED: name of the switch; FORMER: its name in earlier releases. FORMER is
+#: also the beginning of other names, which ``ros2 param dump`` cannot nest.
 ENABLED, FORMER = f'{PREFIX}enabled', PREFIX.rstrip('.')
 #: SWITCH: the switch; its default is false for robots without feedback.
 SWITCH = Spec(True, "correct the gait by the robot's sensors; false by default if the robot file "
@@ -261,8 +261,8 @@ class FeedbackSwitch:
         robot, pattern = self._pattern.robot, self._pattern
         geometry = geometry_of(robot)
         if self._started:
-            compile_apart(self._node, 'feedback', 'feedback', FEEDBACK, moving=True)
-        with announced(self._node, 'the feedback', FEEDBACK):
+            compile_apart(self._node, 'feedback', 'feedback', FEEDBACK_TIME, moving=True)
+        with announced(self._node, 'the feedback', FEEDBACK_TIME):
             warm_up(geometry, len(robot.joints))
         topic = self._value('odometry_topic')
         odometry = Odometry.begin(self._value('odometry_scale'), self._value(
@@ -286,11 +286,11 @@ class FeedbackSwitch:
         pattern, biped = self._pattern, self._biped
         assert isinstance(pattern, BalancedPattern) and biped is not None
         if self._started:
-            compile_apart(self._node, 'balance', 'balance', BALANCE, moving=True)
+            compile_apart(self._node, 'balance', 'balance', BALANCE_TIME, moving=True)
         inputs = self._inputs(GRAVITY * biped.total)
         if self._value('odometry_topic'):
             self._node.get_logger().warning('no odometry: there is none for legs with soles yet')
-        with announced(self._node, 'the feedback', BALANCE):
+        with announced(self._node, 'the feedback', BALANCE_TIME):
             loop = BalanceLoop(pattern, inputs, self._motion)
         if loop.feedback.arms.swings.any():
             self.blocks.append(held_block(self._node, pattern.robot, pattern.held_angles))

@@ -41,11 +41,11 @@ from rclpy.parameter import Parameter, parameter_value_to_python
 # The nodes and topics that a page can show or use, recognised by topics and services.
 
 #: Topics and services of each kind of node: name below the node's own -> type.
-GENERATOR = {'phase': 'std_msgs/msg/Float64MultiArray', 'gait': 'std_msgs/msg/String',
+GENERATOR_INTERFACES = {'phase': 'std_msgs/msg/Float64MultiArray', 'gait': 'std_msgs/msg/String',
              'enable': 'std_srvs/srv/SetBool'}
-SIMULATION = {'push': 'geometry_msgs/msg/Wrench', 'reset': 'std_srvs/srv/Trigger'}
-INVERSION = {'fit': 'std_srvs/srv/Trigger'}
-BRIDGE = {'state': 'std_msgs/msg/String', 'stop': 'std_srvs/srv/Trigger',
+SIMULATION_INTERFACES = {'push': 'geometry_msgs/msg/Wrench', 'reset': 'std_srvs/srv/Trigger'}
+INVERSION_INTERFACES = {'fit': 'std_srvs/srv/Trigger'}
+BRIDGE_INTERFACES = {'state': 'std_msgs/msg/String', 'stop': 'std_srvs/srv/Trigger',
           'damp': 'std_srvs/srv/Trigger'}
 #: Levels of /diagnostics, as pages name them.
 LEVELS = {0: 'ok', 1: 'warn', 2: 'error', 3: 'stale'}
@@ -96,16 +96,16 @@ def discover(node: Node) -> Graph:
         # The panel's own clients keep the name of a service on the graph.
         return (name, kind) in names and ('/srv/' not in kind or node.count_services(name) > 0)
 
-    return Graph(with_names(GENERATOR), with_names(SIMULATION), with_names(INVERSION),
-                 with_names(BRIDGE), frozenset(topics))
+    return Graph(*map(with_names, (GENERATOR_INTERFACES, SIMULATION_INTERFACES,
+                                   INVERSION_INTERFACES, BRIDGE_INTERFACES)), frozenset(topics))
 
 
-#: PATIENCE: longest time to find a service, and again for it to answer, s.
-PATIENCE = 5.0
-#: SILENCE: time without a service after which a line announces the wait, s.
-SILENCE = 1.0
-#: POLL: period in which services and responses are checked, s.
-POLL = 0.01
+#: TIMEOUT: longest time to find a service, and again for it to answer, s.
+TIMEOUT = 5.0
+#: NOTICE_DELAY: time without a service after which a line announces the wait, s.
+NOTICE_DELAY = 1.0
+#: POLL_PERIOD: period in which services and responses are checked, s.
+POLL_PERIOD = 0.01
 
 
 class CallError(CpgError):
@@ -134,7 +134,7 @@ class RequestRefused(CallError):
 class ServiceClients:
     """Calls services through one node."""
 
-    def __init__(self, node: Node, total: float | None = None, search: float = PATIENCE,
+    def __init__(self, node: Node, total: float | None = None, search: float = TIMEOUT,
                  late: Callable[[], None] | None = None) -> None:
         """Call through a node.
 
@@ -142,15 +142,15 @@ class ServiceClients:
             node: that has the clients.
             total: limit of all calls together, s.
             search: time limit for finding a service, s, without ``total``.
-            late: called once if a service has not been found within ``SILENCE``.
+            late: called once if a service has not been found within ``NOTICE_DELAY``.
 
         """
         self._node, self._total, self._search, self._late = node, total, search, late
         self._end = None if total is None else time.monotonic() + total
         self._clients: dict[str, Client] = {}
 
-    async def call(self, kind: Any, name: str, request: Any, patience: float = PATIENCE) -> Any:
-        """Call a service and return its response; ``patience`` is the time limit for it, s.
+    async def call(self, kind: Any, name: str, request: Any, timeout: float = TIMEOUT) -> Any:
+        """Call a service and return its response; ``timeout`` is the time limit for it, s.
 
         Raises:
             NoService: the service is not there in time.
@@ -160,13 +160,13 @@ class ServiceClients:
         client = self.client(kind, name)
         try:
             await self._found(client, name)
-            end = self._end or time.monotonic() + patience
+            end = self._end or time.monotonic() + timeout
             answer = client.call_async(request)
             while not answer.done():
                 if time.monotonic() > end:
                     client.remove_pending_request(answer)
-                    raise CallError(f'{name} did not answer within {self._total or patience:g} s')
-                await asyncio.sleep(POLL)
+                    raise CallError(f'{name} did not answer within {self._total or timeout:g} s')
+                await asyncio.sleep(POLL_PERIOD)
                 _receive_response(client)
         except InvalidHandle:  # it was forgotten meanwhile
             raise NoService(name) from None
@@ -186,10 +186,10 @@ class ServiceClients:
             now = time.monotonic()
             if now > end:
                 raise NoService(name)
-            if self._late is not None and now > began + SILENCE:
+            if self._late is not None and now > began + NOTICE_DELAY:
                 self._late()
                 self._late = None
-            await asyncio.sleep(POLL)
+            await asyncio.sleep(POLL_PERIOD)
 
     def forget(self, node: str) -> None:
         """Destroy the clients of a node's services."""
@@ -212,13 +212,13 @@ class NodeClient:
     def __init__(self, services: ServiceClients, name: str) -> None:
         self._services, self.name = services, name
 
-    async def call(self, kind: Any, service: str, patience: float = PATIENCE, **fields: Any
+    async def call(self, kind: Any, service: str, timeout: float = TIMEOUT, **fields: Any
                    ) -> Any:
         """Call a service below the node's name with a request's fields; return the response."""
         return await self._services.call(kind, f'{self.name}/{service}', kind.Request(**fields),
-                                         patience)
+                                         timeout)
 
-    async def command(self, kind: Any, service: str, patience: float = PATIENCE, **fields: Any
+    async def command(self, kind: Any, service: str, timeout: float = TIMEOUT, **fields: Any
                       ) -> str:
         """Call a service of a type such as SetBool or Trigger; return the message.
 
@@ -226,19 +226,19 @@ class NodeClient:
             RequestRefused: success is false.
 
         """
-        answer = await self.call(kind, service, patience, **fields)
+        answer = await self.call(kind, service, timeout, **fields)
         if not answer.success:
             raise RequestRefused(answer.message or f'{self.name}/{service} refused')
         return str(answer.message)
 
-    async def set_parameters(self, values: Mapping[str, Any], patience: float = PATIENCE) -> None:
+    async def set_parameters(self, values: Mapping[str, Any], timeout: float = TIMEOUT) -> None:
         """Set parameters, all or none.
 
         Raises:
             RequestRefused: the node refuses.
 
         """
-        answer = await self.call(SetParametersAtomically, 'set_parameters_atomically', patience,
+        answer = await self.call(SetParametersAtomically, 'set_parameters_atomically', timeout,
                                  parameters=[Parameter(name, value=value).to_parameter_msg()
                                              for name, value in values.items()])
         if not answer.result.successful:

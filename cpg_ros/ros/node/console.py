@@ -35,12 +35,12 @@ import time
 from typing import TextIO
 
 IN, OUT, ERROR = 0, 1, 2
-#: TO_STREAM: arguments by which rclpy's logger writes to its stream only: to a file it would wait.
-TO_STREAM = '--ros-args', '--disable-external-lib-logs', '--enable-stdout-logs'
-#: SIGNALS: signals that end nodes, which the copying process ignores: it ends after all writers.
-SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT
-#: PATIENCE: longest time that the end of a node waits for its last lines to be copied, s.
-PATIENCE = 0.2
+#: STREAM_ARGUMENTS: rclpy's logger writes to its stream only: to a file it would wait.
+STREAM_ARGUMENTS = '--ros-args', '--disable-external-lib-logs', '--enable-stdout-logs'
+#: Signals that end nodes; the copying process ignores them, as it ends after all writers.
+TERMINATION_SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT
+#: COPY_TIMEOUT: longest time that the end of a node waits for its last lines to be copied, s.
+COPY_TIMEOUT = 0.2
 COLOR = re.compile(rb'\033\[\d+m')
 
 
@@ -113,12 +113,12 @@ def never_wait(name: str, arguments: list[str]) -> None:
 
 
 def _end(copying: subprocess.Popen) -> None:
-    """Close both streams, and wait for the copying process, no longer than PATIENCE."""
+    """Close both streams, and wait for the copying process, no longer than COPY_TIMEOUT."""
     closed = os.open(os.devnull, os.O_WRONLY)
     for descriptor in OUT, ERROR:
         os.dup2(closed, descriptor)
     with contextlib.suppress(subprocess.TimeoutExpired):
-        copying.wait(PATIENCE)
+        copying.wait(COPY_TIMEOUT)
 
 
 def _wanted(kind: str, arguments: list[str]) -> bool:
@@ -159,7 +159,7 @@ def main(path: str, other: int) -> None:
         other: descriptor of a pipe that is copied to standard error.
 
     """
-    for number in SIGNALS:
+    for number in TERMINATION_SIGNALS:
         signal.signal(number, signal.SIG_IGN)
     try:
         Path(path).parent.mkdir(parents=True, exist_ok=True)

@@ -27,8 +27,8 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 #: Clock of timers that must not stop with simulated time, nor jump with the system clock.
 STEADY = Clock(clock_type=ClockType.STEADY_TIME)
-#: START: name of the status that reports the progress of a node's start.
-START = 'start'
+#: START_STATUS: name of the status that reports the progress of a node's start.
+START_STATUS = 'start'
 #: Level, message and values of a status.
 Health = tuple[bytes, str, Mapping[str, object]]
 
@@ -60,14 +60,14 @@ class HealthPublisher:
         self._publisher.publish(message)
 
 
-#: LOOK: period in which other publishers are searched for, s.
-LOOK = 0.25
-#: NAMING: longest time from the discovery of a publisher to that of its node's name, s.
-NAMING = 1.0
-#: NAMELESS: text for a node whose name the graph does not know.
-NAMELESS = 'a node of unknown name'
+#: SEARCH_PERIOD: period in which other publishers are searched for, s.
+SEARCH_PERIOD = 0.25
+#: NAME_TIMEOUT: longest time from the discovery of a publisher to that of its node's name, s.
+NAME_TIMEOUT = 1.0
+#: UNKNOWN_NODE: text for a node whose name the graph does not know.
+UNKNOWN_NODE = 'a node of unknown name'
 #: Names that the graph gives to a node until it learns the name, and to any program without ROS.
-PLACEHOLDERS = {'_NODE_NAME_UNKNOWN_': NAMELESS,
+PLACEHOLDERS = {'_NODE_NAME_UNKNOWN_': UNKNOWN_NODE,
                 '_CREATED_BY_BARE_DDS_APP_': 'a program without ROS'}
 
 
@@ -95,7 +95,7 @@ def others_on(node: Node, topic: str, own: int = 1, tolerated: int = 0, companio
     expected = [node.get_fully_qualified_name()] * own
     if companion:
         # On a busy machine, its name is known later than its publisher.
-        expected.append(companion if companion in names else NAMELESS)
+        expected.append(companion if companion in names else UNKNOWN_NODE)
     for name in expected:
         if name in names:
             names.remove(name)
@@ -118,27 +118,27 @@ class OtherPublishers:
         self._node, self._topics, self._remedy = node, topics, remedy
         self.text = self._warned = ''
         self._since = 0.0
-        self._timer = node.create_timer(LOOK, self.check, clock=STEADY)
+        self._timer = node.create_timer(SEARCH_PERIOD, self.check, clock=STEADY)
 
     def seek(self, seconds: float) -> str:
         """Search until one is found, or for a time in s; return the text."""
         end = time.monotonic() + seconds
         while not self.check() and time.monotonic() < end:
-            time.sleep(LOOK / 5)
-        while NAMELESS in self.text and time.monotonic() < self._since + NAMING:
-            time.sleep(LOOK / 5)
+            time.sleep(SEARCH_PERIOD / 5)
+        while UNKNOWN_NODE in self.text and time.monotonic() < self._since + NAME_TIMEOUT:
+            time.sleep(SEARCH_PERIOD / 5)
             self.check()
         return self.text
 
     def check(self) -> str:
-        """Search now; return the text. The warning waits up to NAMING for a name."""
+        """Search now; return the text. The warning waits up to NAME_TIMEOUT for a name."""
         text = '; '.join(f'{topic} is published by {names}, too'
                          for topic in self._topics if (names := others_on(self._node, topic)))
         text += self._remedy * bool(text)
         if text != self.text:
             self.text, self._since = text, time.monotonic()
-        if text != self._warned and (NAMELESS not in text
-                                     or time.monotonic() >= self._since + NAMING):
+        if text != self._warned and (UNKNOWN_NODE not in text
+                                     or time.monotonic() >= self._since + NAME_TIMEOUT):
             self._warned = text
             if text:
                 self._node.get_logger().warning(text)

@@ -69,8 +69,8 @@ def message_fields(kind: str) -> str:
         raise UnknownType(f'the fields of {kind} are not known here') from None
 
 
-#: WORD: alignment of an integer in CDR, and size of the encapsulation of a message, bytes.
-WORD = 4
+#: WORD_SIZE: alignment of an integer in CDR, and size of the encapsulation of a message, bytes.
+WORD_SIZE = 4
 #: Indices of words. STAMP, DURATION: seconds and nanoseconds; NUMBERS: first word of the numbers.
 STAMP, DURATION, NUMBERS = (0, 1), (2, 3), 4
 
@@ -120,10 +120,10 @@ class Template:
         words = []
         for mark, sources in marks:
             at = raw.find(mark)
-            if raw.count(mark) != 1 or at % WORD:
+            if raw.count(mark) != 1 or at % WORD_SIZE:
                 raise ValueError(f'{type(self.message).__name__}: cannot be filled in place, as '
                                  'this middleware serialises it')
-            words.append(at // WORD + np.arange(len(sources)))
+            words.append(at // WORD_SIZE + np.arange(len(sources)))
         return raw, np.concatenate(words), np.concatenate([sources for _, sources in marks])
 
 
@@ -178,13 +178,13 @@ class MessageBlock:
         self._handles: list[Any] = []
         raws, changing, sources = zip(*(template.serialised() for _, template in templates),
                                     strict=True)
-        starts = np.cumsum([0, *(-(-len(raw) // WORD) for raw in raws)])
-        memory = bytearray(WORD * int(starts[-1]))
+        starts = np.cumsum([0, *(-(-len(raw) // WORD_SIZE) for raw in raws)])
+        memory = bytearray(WORD_SIZE * int(starts[-1]))
         self._block = np.frombuffer(memory, dtype=np.uint32)
         self._targets = np.concatenate([start + here for start, here
                                        in zip(starts[:-1], changing, strict=True)])
         self._sources = np.concatenate(sources)
-        for (topic, template), raw, start in zip(templates, raws, WORD * starts[:-1],
+        for (topic, template), raw, start in zip(templates, raws, WORD_SIZE * starts[:-1],
                                                  strict=True):
             memory[start:start + len(raw)] = raw
             publisher = node.create_publisher(
@@ -204,7 +204,7 @@ class MessageBlock:
         self._pointers = np.array([handle.pointer for handle in self._handles], dtype=np.uint64)
         for message, length in zip(self._messages, lengths, strict=True):
             message.buffer, message.length, message.capacity = at, length, length
-            at += -(-length // WORD) * WORD
+            at += -(-length // WORD_SIZE) * WORD_SIZE
         self._library = native.library()
         return native.SerializedMessages(
             native.address('rcl_publish_serialized_message'), self._pointers.ctypes.data,

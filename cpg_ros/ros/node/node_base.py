@@ -31,7 +31,7 @@ from typing import Any
 
 from cpg_ros.common.command_line import say
 from cpg_ros.common.errors import CpgError
-from cpg_ros.ros.node.console import never_wait, TO_STREAM
+from cpg_ros.ros.node.console import never_wait, STREAM_ARGUMENTS
 from cpg_ros.ros.node.health import STEADY
 from cpg_ros.ros.node.parameters import as_doubles, as_list, kind_of, Spec, StrictParameterService
 from lifecycle_msgs.srv import ChangeState
@@ -56,7 +56,7 @@ from rclpy.utilities import get_rmw_implementation_identifier, remove_ros_args
 # The signals that end a node, and the end of the process while a thread is still at work.
 
 #: How long to wait for the end of a thread, s.
-PATIENCE = 0.2
+JOIN_TIMEOUT = 0.2
 
 
 def termination_signals() -> list[signal.Signals]:
@@ -71,7 +71,7 @@ def exit_code(code: int, *threads: threading.Thread | None) -> int:
     The C++ runtime aborts a process whose thread returns to an ended interpreter.
     """
     for thread in filter(None, threads):
-        thread.join(PATIENCE)
+        thread.join(JOIN_TIMEOUT)
         if thread.is_alive():
             os._exit(code)
     return code
@@ -82,12 +82,12 @@ def exit_code(code: int, *threads: threading.Thread | None) -> int:
 #: TRANSPORT: variable that selects the transport of Fast DDS, and its value here; the user's own
 #: value takes precedence.
 TRANSPORT = 'FASTDDS_BUILTIN_TRANSPORTS', 'UDPv4'
-#: RANGE: variable of ROS 2's discovery range; LOCAL_ONLY: its predecessor, which takes precedence.
-RANGE, LOCAL_ONLY = 'ROS_AUTOMATIC_DISCOVERY_RANGE', 'ROS_LOCALHOST_ONLY'
+#: Variable of ROS 2's discovery range, and its predecessor, which takes precedence.
+DISCOVERY_RANGE, LOCALHOST_ONLY = 'ROS_AUTOMATIC_DISCOVERY_RANGE', 'ROS_LOCALHOST_ONLY'
 #: PROFILES: both names of the variable of Fast DDS's profile file.
 PROFILES = 'FASTDDS_DEFAULT_PROFILES_FILE', 'FASTRTPS_DEFAULT_PROFILES_FILE'
-#: LOCALHOST: profile of a participant with the discovery range LOCALHOST, without shared memory.
-LOCALHOST = Path(__file__).with_name('localhost.xml')
+#: Profile of a participant with the discovery range LOCALHOST, without shared memory.
+LOCALHOST_PROFILE = Path(__file__).with_name('localhost.xml')
 
 
 def leave_shared_memory() -> None:
@@ -103,11 +103,11 @@ def leave_shared_memory() -> None:
     name, udp = TRANSPORT
     configured = (environment.setdefault(name, udp) != udp
                   or any(environment.get(name) for name in ('ROS_STATIC_PEERS', *PROFILES)))
-    local = (environment.get(LOCAL_ONLY) == '1' or (
-        LOCAL_ONLY not in environment and environment.get(RANGE) == 'LOCALHOST'))
+    local = (environment.get(LOCALHOST_ONLY) == '1' or (
+        LOCALHOST_ONLY not in environment and environment.get(DISCOVERY_RANGE) == 'LOCALHOST'))
     if local and not configured and 'fastrtps' in get_rmw_implementation_identifier():
-        environment.pop(LOCAL_ONLY, None)
-        environment.update({RANGE: 'SYSTEM_DEFAULT', PROFILES[1]: str(LOCALHOST)})
+        environment.pop(LOCALHOST_ONLY, None)
+        environment |= {DISCOVERY_RANGE: 'SYSTEM_DEFAULT', PROFILES[1]: str(LOCALHOST_PROFILE)}
 
 
 # ROS's life cycle beside a node that is no LifecycleNode: a step for each transition.
@@ -170,10 +170,10 @@ class Lifecycle(LifecycleNodeMixin, Node):
     on_shutdown = partialmethod(_step, 'shutdown')
 
 
-#: TURN: period in which a node takes its turn in the executor of another program, s.
-TURN = 0.02
-#: LAST_DOMAIN: largest domain id; the ports of larger ones exceed UDP's range.
-LAST_DOMAIN = 232
+#: SPIN_PERIOD: period in which a node takes its turn in the executor of another program, s.
+SPIN_PERIOD = 0.02
+#: MAX_DOMAIN_ID: largest domain id; the ports of larger ones exceed UDP's range.
+MAX_DOMAIN_ID = 232
 
 
 class StartError(CpgError):
@@ -214,7 +214,7 @@ class StartedNode(Node):
         self.stop = threading.Event()
         self.signals: list[int] = []
         self._begun = self._over = False
-        self._turns = self.create_timer(TURN, self._take_turn, clock=STEADY)
+        self._turns = self.create_timer(SPIN_PERIOD, self._take_turn, clock=STEADY)
 
     def _declare(self, specs: Mapping[str, Spec]) -> None:
         """Declare parameters by name.
@@ -401,8 +401,8 @@ def _first(error: Exception) -> str:
 def _domain() -> str:
     """Return what is wrong with the domain, or ''; a wrong one makes Fast DDS abort."""
     domain = os.environ.get('ROS_DOMAIN_ID', '')
-    return (f'ROS_DOMAIN_ID {domain} is not from 0 to {LAST_DOMAIN}'
-            if domain.isdecimal() and int(domain) > LAST_DOMAIN else '')
+    return (f'ROS_DOMAIN_ID {domain} is not from 0 to {MAX_DOMAIN_ID}'
+            if domain.isdecimal() and int(domain) > MAX_DOMAIN_ID else '')
 
 
 def _join_graph(name: str, arguments: list[str]) -> tuple[int, str]:
@@ -415,7 +415,8 @@ def _join_graph(name: str, arguments: list[str]) -> tuple[int, str]:
     except OSError as error:
         return 1, f'no process that writes the log can be started: {error.strerror}'
     try:
-        rclpy.init(args=[*arguments, *TO_STREAM], signal_handler_options=SignalHandlerOptions.NO)
+        rclpy.init(args=[*arguments, *STREAM_ARGUMENTS],
+                   signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:
         return 2, f'ROS arguments: {_first(error)}'
     return 0, ''

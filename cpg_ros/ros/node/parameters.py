@@ -46,12 +46,12 @@ from rclpy.type_support import check_for_type_support
 # Descriptions of a node's parameters, and conversions of their values.
 
 #: Name of a value of each type, for messages.
-KINDS = {bool: 'a bool', int: 'an integer', float: 'a double', str: 'a string'}
+TYPE_NAMES = {bool: 'a bool', int: 'an integer', float: 'a double', str: 'a string'}
 
 
-#: PRESETS: separates, in the constraints of a gait, gaits from presets with names of their own;
-#: UNTUNED: precedes those that are not tuned for the robot.
-PRESETS, UNTUNED = '; presets: ', '; not tuned for this robot: '
+#: PRESETS_LABEL: separates, in the constraints of a gait, gaits from presets with names of
+#: their own; UNTUNED_LABEL: precedes those that are not tuned for the robot.
+PRESETS_LABEL, UNTUNED_LABEL = '; presets: ', '; not tuned for this robot: '
 
 
 def one_of(names: Iterable[str], further: str = '') -> str:
@@ -61,19 +61,19 @@ def one_of(names: Iterable[str], further: str = '') -> str:
 
 def choices(constraints: str) -> list[str]:
     """Return the words in a descriptor's constraints, if one_of wrote them."""
-    match = re.search(r'one of: (.*)', constraints.partition(UNTUNED)[0])
-    names = re.split(f', |{PRESETS}', match[1]) if match else []
+    match = re.search(r'one of: (.*)', constraints.partition(UNTUNED_LABEL)[0])
+    names = re.split(f', |{PRESETS_LABEL}', match[1]) if match else []
     return [name for name in names if re.fullmatch(r'[\w.-]+', name)]
 
 
 def presets_among(constraints: str) -> list[str]:
     """Return those choices that are presets with other names than gaits."""
-    return choices(f'one of: {constraints.partition(PRESETS)[2]}')
+    return choices(f'one of: {constraints.partition(PRESETS_LABEL)[2]}')
 
 
 def untuned_among(constraints: str) -> list[str]:
     """Return those choices of a gait that are not tuned for the robot."""
-    return choices(f'one of: {constraints.partition(UNTUNED)[2]}')
+    return choices(f'one of: {constraints.partition(UNTUNED_LABEL)[2]}')
 
 
 @dataclass(frozen=True)
@@ -129,8 +129,8 @@ def as_list(parameter: Parameter, default: list) -> Parameter:
 def kind_of(default: Any) -> str:
     """Return the name of a parameter's type, from its default, for messages."""
     if isinstance(default, list):
-        return f'a list of {KINDS[type(default[0]) if default else str].split()[1]}s'
-    return KINDS[type(default)]
+        return f'a list of {TYPE_NAMES[type(default[0]) if default else str].split()[1]}s'
+    return TYPE_NAMES[type(default)]
 
 
 # Requests of a service whose first field is a sequence, bounded in length.
@@ -176,7 +176,7 @@ def bounded(service: type, most: int) -> type:
 
 
 #: Limit of the names or values in a request; no node has nearly as many parameters.
-MOST = 1000
+MAX_PARAMETERS = 1000
 
 
 def _rejected(reason: str) -> SetParametersResult:
@@ -199,7 +199,7 @@ class StrictParameterService(ParameterService):
 
     The executor stays free for urgent requests, such as a stop. Of several waiting changes of the
     same parameters, only the last valid one is applied. Values of unknown type, unknown names and
-    more than MOST parameters are rejected with a reason; rclpy 7.1 raises in the executor.
+    more than MAX_PARAMETERS are rejected with a reason; rclpy 7.1 raises in the executor.
 
     Attributes:
         thread: applies the changes, once started.
@@ -234,12 +234,13 @@ class StrictParameterService(ParameterService):
             kind, f'{node.get_name()}/{name[1:]}', limited, qos_profile=qos_profile_parameters,
             callback_group=self._group)
         # Used by the executor to take requests and to send responses.
-        service.srv_type = SimpleNamespace(Request=bounded(kind, MOST), Response=kind.Response)
+        service.srv_type = SimpleNamespace(Request=bounded(kind, MAX_PARAMETERS),
+                                           Response=kind.Response)
         if changes:
             service.send_response = partial(self._defer, service)
 
     def _too_many(self, kind: type, count: int, response: Any) -> Any:
-        reason = f'{count} parameters in one request: at most {MOST} are allowed'
+        reason = f'{count} parameters in one request: at most {MAX_PARAMETERS} are allowed'
         if kind is srv.SetParameters:
             response.results = [_rejected(reason)]
         elif kind is srv.SetParametersAtomically:

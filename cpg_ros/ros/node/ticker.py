@@ -36,7 +36,7 @@ from rosgraph_msgs.msg import Clock
 
 #: Flags of mlockall. MCL_CURRENT: lock all present pages; MCL_FUTURE: lock all future ones.
 MCL_CURRENT, MCL_FUTURE = 1, 2
-LIMITS = 'in /etc/security/limits.conf, and log in again'
+LIMITS_HINT = 'in /etc/security/limits.conf, and log in again'
 
 SPECS = fixed({
     'thread_priority': Spec(0, 'real-time priority (SCHED_FIFO) of the publishing thread; the '
@@ -90,7 +90,7 @@ class RealTime:
         if self.lock:
             if reason := _lock_memory():
                 refused.append(f'lock_memory refused: {reason}. Raise the limit memlock '
-                               f'(@realtime - memlock unlimited) {LIMITS}')
+                               f'(@realtime - memlock unlimited) {LIMITS_HINT}')
             else:
                 granted.append('memory locked')
         if self.cores:
@@ -104,7 +104,7 @@ class RealTime:
             except OSError as error:
                 refused.append(f'thread_priority {self.priority} refused: {error.strerror}. Raise '
                                f'the limit rtprio (@realtime - rtprio {max(98, self.priority)}) '
-                               f'{LIMITS}')
+                               f'{LIMITS_HINT}')
         return granted, refused
 
     def request(self, logger: RcutilsLogger) -> None:
@@ -139,13 +139,12 @@ def _lock_memory() -> str:
     return 'this system has no mlockall'
 
 
-#: STALL: number of periods behind, as after a suspension, from which on ticks are left out: a
-#: robot must not be driven through the motion it missed, and never gets more than two ticks at
-#: once.
-STALL = 2
-#: MOST_BEHIND: longest delay that a ticker without ``resume``, as in a simulation, makes up for,
-#: s.
-MOST_BEHIND = 1.0
+#: STALL_PERIODS: number of periods behind, as after a suspension, from which on ticks are left
+#: out: a robot must not be driven through the motion it missed, and never gets more than two ticks
+#: at once.
+STALL_PERIODS = 2
+#: Longest delay that a ticker without ``resume``, as in a simulation, makes up for, s.
+MAX_DELAY = 1.0
 
 
 class TickThread(threading.Thread):
@@ -229,7 +228,7 @@ class Ticker(TickThread):
             tick: called with dt and stamp.
             restart: called when simulated time jumps back.
             failed: called with the exception that ended the thread.
-            resume: called after a stall; None to catch up with up to MOST_BEHIND instead.
+            resume: called after a stall; None to catch up with up to MAX_DELAY instead.
             begin: called first in the thread.
             prepare: called with the loop in the thread, first and after ``attend``; it may enter
                 what does the following ticks in place of ``tick``. Its result is kept alive
@@ -282,7 +281,8 @@ class Ticker(TickThread):
         loop.deadline = 0 if self._clock is not None else time.monotonic_ns()
         while not self._ending.is_set():
             self.count.wanted, loop.period = 0, round(1e9 / self.rate)
-            loop.stall = round(1e9 * MOST_BEHIND) if self._resume is None else STALL * loop.period
+            loop.stall = (round(1e9 * MAX_DELAY) if self._resume is None else
+                          STALL_PERIODS * loop.period)
             with self._prepare(loop), self._clock or nullcontext():
                 # Asked again, as wanted may have been set before it is reset above.
                 while not self._ending.is_set() and (

@@ -28,9 +28,7 @@ from websockets.asyncio.server import broadcast, ServerConnection
 # The requests of a page, checked completely before they are carried out.
 
 #: Longest text in a request, characters.
-LONGEST_REQUEST = 500
-#: Hardest push, N.
-HARDEST = 500.0
+MAX_TEXT_LENGTH = 500
 
 
 class RequestError(CpgError):
@@ -47,8 +45,8 @@ class Request:
 
 
 def _text(value: Any) -> str:
-    if not isinstance(value, str) or len(value) > LONGEST_REQUEST or not value.isprintable():
-        raise RequestError(f'must be text of at most {LONGEST_REQUEST} characters')
+    if not isinstance(value, str) or len(value) > MAX_TEXT_LENGTH or not value.isprintable():
+        raise RequestError(f'must be text of at most {MAX_TEXT_LENGTH} characters')
     return value
 
 
@@ -85,7 +83,7 @@ ACTIONS: dict[str, dict[str, Callable[[Any], Any]]] = {
     'alive': {}, 'take_over': {}, 'release': {}, 'stop': {}, 'enable': {'on': _flag}, 'reset': {},
     'seat': {'on': _flag},
     'sit': {'bridge': _text}, 'damp': {'bridge': _text},
-    'push': {'force': _number(0.0, HARDEST), 'direction': _number(-360.0, 360.0)},
+    'push': {'force': _number(0.0, 500.0), 'direction': _number(-360.0, 360.0)},
     'record': {'on': _flag}, 'fit': {}}
 
 
@@ -124,16 +122,16 @@ def read(text: str | bytes) -> Request:
                             for name, check in fields.items()}, stamp)
 
 
-#: MOST: largest number of pages with all rights; MOST_STOPPING: of further pages that can only
-#: stop.
-MOST, MOST_STOPPING = 16, 240
+#: MAX_PAGES: largest number of pages with all rights; MAX_STOP_PAGES: of further pages that can
+#: only stop.
+MAX_PAGES, MAX_STOP_PAGES = 16, 240
 #: Limits of a page's requests. RATE: per second; BURST: at once.
 RATE, BURST = 60.0, 120.0
-#: A page with more than SLOW unsent bytes gets no frames; one with more than LARGEST, or with more
-#: than SLOW for PATIENCE s, is disconnected.
-SLOW, LARGEST, PATIENCE = 200_000, 16_000_000, 20.0
-#: Longest message to a page, characters: below LARGEST, so that none disconnects a page.
-LONGEST = 8_000_000
+#: A page with more than SLOW_BACKLOG unsent bytes gets no frames; one with more than MAX_BACKLOG,
+#: or with more than SLOW_BACKLOG for BACKLOG_TIMEOUT s, is disconnected.
+SLOW_BACKLOG, MAX_BACKLOG, BACKLOG_TIMEOUT = 200_000, 16_000_000, 20.0
+#: Longest message to a page, characters: below MAX_BACKLOG, so that none disconnects a page.
+MAX_MESSAGE_LENGTH = 8_000_000
 
 
 class Page:
@@ -183,18 +181,18 @@ class Page:
     def keeps_up(self) -> bool:
         """Return whether the page receives frames in time; disconnect it if it never will."""
         now, waiting = time.monotonic(), self.waiting()
-        if waiting < SLOW:
+        if waiting < SLOW_BACKLOG:
             self._fast = now
-        elif waiting > LARGEST or now - self._fast > PATIENCE:
+        elif waiting > MAX_BACKLOG or now - self._fast > BACKLOG_TIMEOUT:
             self.connection.transport.abort()
-        return waiting < SLOW
+        return waiting < SLOW_BACKLOG
 
 
 class Pages:
     """The open pages; belongs to the thread of the event loop.
 
     Attributes:
-        everyone: all of them, oldest first; those beyond MOST can only stop the robot.
+        everyone: all of them, oldest first; those beyond MAX_PAGES can only stop the robot.
 
     """
 
@@ -204,18 +202,18 @@ class Pages:
     @property
     def open(self) -> list[Page]:  # noqa: A003
         """Pages that can do everything."""
-        return self.everyone[:MOST]
+        return self.everyone[:MAX_PAGES]
 
     @property
     def full(self) -> bool:
         """Whether no page is admitted any more, not even one that can only stop the robot."""
-        return len(self.everyone) >= MOST + MOST_STOPPING
+        return len(self.everyone) >= MAX_PAGES + MAX_STOP_PAGES
 
     def admit(self, connection: ServerConnection) -> Page:
         """Add the page of a connection, and return it."""
         taken = {page.number for page in self.everyone}
         number = next(k for k in range(1, len(taken) + 2) if k not in taken)
-        self.everyone.append(Page(connection, number, stop_only=len(self.everyone) >= MOST))
+        self.everyone.append(Page(connection, number, stop_only=len(self.everyone) >= MAX_PAGES))
         return self.everyone[-1]
 
     def leave(self, page: Page) -> Page | None:
@@ -233,9 +231,9 @@ class Pages:
     def send(self, pages: Iterable[Page], message: dict[str, Any]) -> None:
         """Send a message to pages; in place of one that is too long, a line that says so."""
         text = json.dumps(message, allow_nan=False)
-        if len(text) > LONGEST:
+        if len(text) > MAX_MESSAGE_LENGTH:
             self.notify(pages, f"'{message['type']}' is not shown: it has {len(text) / 1e6:.3g} "
-                        f'MB, more than the {LONGEST / 1e6:g} MB that a page is sent')
+                        f'MB, more than the {MAX_MESSAGE_LENGTH / 1e6:g} MB that a page is sent')
         else:
             broadcast([page.connection for page in pages], text)
 

@@ -30,22 +30,22 @@ from cpg_ros.common.errors import CpgError
 from cpg_ros.common.files import is_loopback
 from cpg_ros.fitting.recordings.bag_writer import BagError
 from cpg_ros.motion.description import load_urdf
-from cpg_ros.ros.bag_recorder import BagRecorder, EVERY
+from cpg_ros.ros.bag_recorder import BagRecorder, POLL_PERIOD
 from cpg_ros.ros.node.client import (
     discover,
     Graph,
     namespace,
     NodeClient,
-    PATIENCE,
     ServiceClients,
+    TIMEOUT,
 )
 from cpg_ros.ros.node.console import aside
-from cpg_ros.ros.node.health import HealthPublisher, START
+from cpg_ros.ros.node.health import HealthPublisher, START_STATUS
 from cpg_ros.ros.node.node_base import run, StartedNode, StartError
 from cpg_ros.ros.node.parameters import fixed, Spec
 from cpg_ros.ros.panel import pages as requests
-from cpg_ros.ros.panel.pages import MOST, Page, Pages, Request, RequestError, SLOW
-from cpg_ros.ros.panel.robot_view import BridgeViews, HEALTH, RobotView, STOPS, Subscriptions
+from cpg_ros.ros.panel.pages import MAX_PAGES, Page, Pages, Request, RequestError, SLOW_BACKLOG
+from cpg_ros.ros.panel.robot_view import BridgeViews, HEALTH, RobotView, STOP_CALLS, Subscriptions
 from cpg_ros.ros.panel.teleop import LeaseError
 from cpg_ros.ros.panel.web_server import token_for, WebServer
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -53,8 +53,8 @@ import rclpy
 from rclpy.node import Node
 from std_srvs.srv import SetBool, Trigger
 
-#: FRESH: time after its last status for which a node counts as starting, s.
-FRESH = 4.0
+#: STATUS_TIMEOUT: time after its last status for which a node counts as starting, s.
+STATUS_TIMEOUT = 4.0
 
 # Records the topics of a robot into bags, one after another, in a thread of its own.
 
@@ -117,7 +117,7 @@ class Recorder:
         why = ''
         try:
             with closing(recorder):
-                while not self._stop.wait(EVERY):
+                while not self._stop.wait(POLL_PERIOD):
                     recorder.poll()
                     if recorder.size > self._largest:
                         why = f'{self.bag} is full ({recorder.size / 1e6:.0f} MB)'
@@ -170,14 +170,14 @@ class Recorder:
 
 # Carries out the requests of pages.
 
-#: A fit may take this long, s.
-FIT = 120.0
-#: LATE: largest age on arrival, s, of requests in MOVING.
-LATE = 2.0
-#: MOVING: requests, other than steering, that move the robot and therefore take the lease.
-MOVING = ('set', 'enable', 'seat', 'push', 'reset', 'take_over')
-#: EVERYWHERE: topics that are recorded for a generator in any namespace.
-EVERYWHERE = ('/diagnostics', '/tf', '/tf_static', '/clock')
+#: Of a fit, s.
+FIT_TIMEOUT = 120.0
+#: MAX_REQUEST_AGE: largest age on arrival, s, of requests in MOTION_REQUESTS.
+MAX_REQUEST_AGE = 2.0
+#: Requests, other than steering, that move the robot and therefore take the lease.
+MOTION_REQUESTS = ('set', 'enable', 'seat', 'push', 'reset', 'take_over')
+#: GLOBAL_TOPICS: topics that are recorded for a generator in any namespace.
+GLOBAL_TOPICS = ('/diagnostics', '/tf', '/tf_static', '/clock')
 
 
 class RequestHandler:
@@ -208,9 +208,9 @@ class RequestHandler:
             await self.command(page, view.name, SetBool, 'enable', data=False)
             return
         if page.stop_only and action != 'alive':
-            raise RequestError(f'{MOST} pages are open already: this one can only stop the '
+            raise RequestError(f'{MAX_PAGES} pages are open already: this one can only stop the '
                                'robot')
-        if action in MOVING:
+        if action in MOTION_REQUESTS:
             self._acquire(page, view, request, now)
         if action == 'set':
             view.controls.set(values['name'], values['value'])
@@ -227,18 +227,18 @@ class RequestHandler:
         elif action == 'record':
             await self._record(view, values['on'])
         elif action == 'reset':
-            await self.command(page, view.simulation(), Trigger, action, FIT)
+            await self.command(page, view.simulation(), Trigger, action, FIT_TIMEOUT)
         elif action == 'fit':
             node = view.graph.beside(view.name, view.graph.inversions)
             if not node:
                 raise RequestError(f'there is no inversion node for {view.name}')
-            await self.command(page, node, Trigger, action, FIT)
+            await self.command(page, node, Trigger, action, FIT_TIMEOUT)
 
     def _acquire(self, page: Page, view: RobotView, request: Request, now: float) -> None:
         """Give a page the lease, if its request is fresh and no other page has it."""
-        if (age := now - _stamp(request)) > LATE:
+        if (age := now - _stamp(request)) > MAX_REQUEST_AGE:
             raise RequestError(f'{request.action} came up to {age:.1f} s late, and was '
-                               f'ignored: the limit is {LATE:g} s')
+                               f'ignored: the limit is {MAX_REQUEST_AGE:g} s')
         if request.action != 'take_over':
             view.teleop.acquire(page, now)
         elif lost := view.teleop.take_over(page, now):
@@ -260,7 +260,7 @@ class RequestHandler:
                 raise
 
     async def command(self, page: Page, node: str, kind: Any, service: str,
-                      patience: float = PATIENCE, **fields: Any) -> None:
+                      timeout: float = TIMEOUT, **fields: Any) -> None:
         """Call a service of a node, and show the page the answer.
 
         Raises:
@@ -268,14 +268,14 @@ class RequestHandler:
 
         """
         other = NodeClient(self._services, node)
-        self._pages.notify([page], await other.command(kind, service, patience, **fields), 'told')
+        self._pages.notify([page], await other.command(kind, service, timeout, **fields), 'told')
 
     async def _record(self, view: RobotView, on: bool) -> None:
         if on:
             space = namespace(view.name)
             bag = self._recorder.start(
                 (topic, kind) for topic, kind in view.graph.topics
-                if topic in EVERYWHERE or topic.startswith(f'{space}/'))
+                if topic in GLOBAL_TOPICS or topic.startswith(f'{space}/'))
             self._pages.notify(self._pages.open, f'recording to {bag}', 'told')
         else:
             await asyncio.to_thread(self._recorder.stop)
@@ -290,8 +290,8 @@ def _stamp(request: Request) -> float:
 
 
 NAME = 'cpg_panel'
-#: FRAMES: frames per second that pages get; UPDATE: period in which the graph is searched, s.
-FRAMES, UPDATE = 30.0, 0.5
+#: FRAME_RATE: of pages, Hz; SEARCH_PERIOD: in which the graph is searched, s.
+FRAME_RATE, SEARCH_PERIOD = 30.0, 0.5
 
 SPECS = fixed({
     'host': Spec('127.0.0.1', 'address to listen on; an address that other machines can reach '
@@ -389,9 +389,9 @@ class Panel(StartedNode):
             self.get_logger().warning('anyone on this network who has the token can '
                                       'open the page, and nothing is encrypted')
         loop = asyncio.get_running_loop()
-        due, updated = loop.time(), -UPDATE
+        due, updated = loop.time(), -SEARCH_PERIOD
         while not self.stop.is_set():
-            if due - updated >= UPDATE:
+            if due - updated >= SEARCH_PERIOD:
                 updated = due
                 self._update()
             statuses = [status for message in self._health.receive('/diagnostics')
@@ -405,7 +405,7 @@ class Panel(StartedNode):
             if message := self._bridges.news(statuses):
                 self._pages.send(self._pages.everyone, message)
             self._lease_news()
-            due = max(due + 1.0 / FRAMES, loop.time() - 1.0 / FRAMES)
+            due = max(due + 1.0 / FRAME_RATE, loop.time() - 1.0 / FRAME_RATE)
             await asyncio.sleep(max(due - loop.time(), 0.0))
         for view in self._views.values():
             view.teleop.stop()
@@ -416,7 +416,8 @@ class Panel(StartedNode):
 
     def _update(self) -> None:
         graph, (text, when) = discover(self), self._start
-        starting = text if not graph.generators and time.monotonic() < when + FRESH else ''
+        recent = time.monotonic() < when + STATUS_TIMEOUT
+        starting = text if not graph.generators and recent else ''
         self._health.subscribe_to(HEALTH if self._pages.everyone or not graph.generators else {})
         if (graph, starting) != (self._graph, self._starting):
             self._graph, self._starting = graph, starting
@@ -439,7 +440,7 @@ class Panel(StartedNode):
         """Record the progress of a node that is still starting."""
         for status in statuses:
             node, _, part = status.name.partition(': ')
-            if part == START:
+            if part == START_STATUS:
                 self._start = f'{node} is starting: {status.message}', time.monotonic()
 
     def _lease_news(self) -> None:
@@ -510,15 +511,15 @@ class Panel(StartedNode):
         try:
             request = requests.read(text)
             if request.action == 'choose':
-                if page.waiting() > SLOW:
+                if page.waiting() > SLOW_BACKLOG:
                     raise RequestError('the page has not yet processed what it was sent')
                 self._choose(page, request.values['node'])
-            elif request.action in STOPS:
+            elif request.action in STOP_CALLS:
                 # Which needs neither the lease nor a generator.
                 bridge = request.values['bridge']
                 if bridge not in self._graph.bridges:
                     raise RequestError(f"there is no bridge '{bridge}'")
-                await self._handler.command(page, bridge, Trigger, STOPS[request.action])
+                await self._handler.command(page, bridge, Trigger, STOP_CALLS[request.action])
             elif page.node not in self._views:
                 raise RequestError(f'{page.node} is gone' if page.node else
                                    'there is no generator on the graph')

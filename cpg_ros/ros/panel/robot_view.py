@@ -49,12 +49,12 @@ from std_srvs.srv import SetBool, Trigger
 # The parameters of a node as controls of a page, made from its own descriptors.
 
 #: Types that a page has a control for.
-KINDS = {ParameterType.PARAMETER_BOOL: 'bool', ParameterType.PARAMETER_INTEGER: 'integer',
+CONTROL_TYPES = {ParameterType.PARAMETER_BOOL: 'bool', ParameterType.PARAMETER_INTEGER: 'integer',
          ParameterType.PARAMETER_DOUBLE: 'double', ParameterType.PARAMETER_STRING: 'text'}
 #: How long a node may take to judge a value, s: it may have to solve for a gait.
-PATIENCE = 30.0
+SET_TIMEOUT = 30.0
 #: Parameters that every node of ROS has.
-COMMON = ('qos_overrides.', 'start_type_description_service', 'use_sim_time')
+COMMON_PARAMETERS = ('qos_overrides.', 'start_type_description_service', 'use_sim_time')
 
 
 def unit(text: str) -> str:
@@ -114,16 +114,18 @@ class Controls:
             CallError: it does not answer.
 
         """
-        names = [name for name in await self._node.parameters() if not name.startswith(COMMON)]
+        names = [name for name in await self._node.parameters()
+                 if not name.startswith(COMMON_PARAMETERS)]
         described, values = await self._node.descriptors(names), await self._node.values(names)
         controls = {}
         for name, descriptor, value in zip(names, described, values, strict=True):
-            if descriptor.type not in KINDS:
+            if descriptor.type not in CONTROL_TYPES:
                 continue
             (span,) = (*descriptor.floating_point_range, *descriptor.integer_range)[:1] or (None,)
             controls[name] = {
-                'name': name, 'kind': KINDS[descriptor.type], 'text': descriptor.description,
-                'unit': unit(descriptor.description), 'fixed': descriptor.read_only,
+                'name': name, 'kind': CONTROL_TYPES[descriptor.type],
+                'text': descriptor.description, 'unit': unit(descriptor.description),
+                'fixed': descriptor.read_only,
                 'choices': choices(descriptor.additional_constraints),
                 'presets': presets_among(descriptor.additional_constraints),
                 'untuned': untuned_among(descriptor.additional_constraints),
@@ -166,7 +168,7 @@ class Controls:
             name = next(iter(self._waiting))
             value = self._waiting.pop(name)
             try:
-                await self._node.set_parameters({name: value}, PATIENCE)
+                await self._node.set_parameters({name: value}, SET_TIMEOUT)
             except RequestRefused as error:
                 self._report(f'{name} {value}: {error}')
             except CallError as error:
@@ -176,13 +178,13 @@ class Controls:
 #: Decimal places of values: a tenth of a milliradian is less than a pixel.
 DIGITS = 4
 #: The folder of an absolute path.
-FOLDER = re.compile(r"(?<![\w/:.])/(?:[^/\s:'\"]+/)+")
+FOLDER_PATTERN = re.compile(r"(?<![\w/:.])/(?:[^/\s:'\"]+/)+")
 
 
 #: A topic that is silent for this long has no message, s.
-SILENCE = 1.0
+MESSAGE_TIMEOUT = 1.0
 #: Type of ``robot_description``.
-TEXT = 'std_msgs/msg/String'
+STRING_TYPE = 'std_msgs/msg/String'
 
 
 def descriptions(space: str) -> tuple[str, str]:
@@ -195,7 +197,7 @@ async def _once(watch: Node, kind: type, name: str) -> Any:
     topic = Subscriptions(watch)
     topic.subscribe_to({name: (kind, latched() if kind is String else None)})
     try:
-        for _ in range(round(SILENCE / 0.02)):
+        for _ in range(round(MESSAGE_TIMEOUT / 0.02)):
             if (message := topic.newest(name)) is not None:
                 return message
             await asyncio.sleep(0.02)
@@ -266,7 +268,7 @@ class RobotView:
                 self._node.get_logger().warning(doubt)
             # A page sees folders only of files that the graph names, not of the panel's own.
             named = ' '.join((info.robot, info.model, info.description))
-            doubts = [FOLDER.sub(lambda names: names[0] * (names[0] in named), doubt)
+            doubts = [FOLDER_PATTERN.sub(lambda names: names[0] * (names[0] in named), doubt)
                       for doubt in doubts]
             self._keep({**drawn.message(), 'doubts': doubts})
         except CallError as error:
@@ -283,7 +285,7 @@ class RobotView:
         robot = str(self.controls.value('robot') or '')
         info = shape.RobotInfo(self._urdf, robot=robot)
         for topic in descriptions(self._space):
-            if not (info.urdf or info.description) and (topic, TEXT) in self.graph.topics:
+            if not (info.urdf or info.description) and (topic, STRING_TYPE) in self.graph.topics:
                 message = await _once(self._watch, String, topic)
                 info.description = getattr(message, 'data', '')
         if simulation := self.graph.beside(self.name, self.graph.simulations):
@@ -435,11 +437,11 @@ def _short(values: Any) -> list[float | None]:
 
 
 #: Action of a page -> service of a bridge.
-STOPS = {'sit': 'stop', 'damp': 'damp'}
+STOP_CALLS = {'sit': 'stop', 'damp': 'damp'}
 #: A bridge publishes its status once a second; after this time without one it is stale, s.
-STALE = 3.0
+STATUS_TIMEOUT = 3.0
 #: Longest text of a bridge that is shown, characters.
-LONGEST = 200
+MAX_TEXT_LENGTH = 200
 
 
 class BridgeViews:
@@ -468,7 +470,7 @@ class BridgeViews:
                                  'hottest': None}
             self._when[name] = time.monotonic()
             # A client that the bridge does not know yet would delay a stop.
-            for service in STOPS.values():
+            for service in STOP_CALLS.values():
                 self._services.client(Trigger, f'{name}/{service}')
         self._states.subscribe_to({f'{name}/state': (String, latched())
                              for name in (names if listening else ())})
@@ -478,14 +480,14 @@ class BridgeViews:
         now = time.monotonic()
         for name in self._shown:
             if (state := self._states.newest(f'{name}/state')) is not None:
-                self._shown[name]['state'] = state.data[:LONGEST]
+                self._shown[name]['state'] = state.data[:MAX_TEXT_LENGTH]
         for status in statuses:
             if (name := status.name.partition(': ')[0]) in self._shown:
                 self._when[name] = now
                 self._shown[name].update(_read(status))
         for name, when in self._when.items():
-            if now > when + STALE:
-                self._shown[name].update(level='stale', text=f'no status for {STALE:g} s')
+            if now > when + STATUS_TIMEOUT:
+                self._shown[name].update(level='stale', text=f'no status for {STATUS_TIMEOUT:g} s')
         message = {'type': 'bridges', 'bridges': {name: dict(self._shown[name])
                                                   for name in sorted(self._shown)}}
         if message == self.message:
@@ -498,9 +500,9 @@ def _read(status: DiagnosticStatus) -> dict[str, Any]:
     """Return the part of a bridge's status that pages show."""
     values = {pair.key: value for pair in status.values
               if math.isfinite(value := _number(pair.value))}
-    heat = [(value, key.removesuffix('[deg C]').strip()[:LONGEST])
+    heat = [(value, key.removesuffix('[deg C]').strip()[:MAX_TEXT_LENGTH])
             for key, value in values.items() if key.endswith('[deg C]')]
-    return {'level': level(status), 'text': status.message[:LONGEST],
+    return {'level': level(status), 'text': status.message[:MAX_TEXT_LENGTH],
             'battery': values.get('battery [%]'), 'hottest': max(heat, default=None)}
 
 

@@ -41,18 +41,18 @@ from cpg_ros.motion.meshes import find_mesh, merged, Mesh, MeshError, read_mesh
 from cpg_ros.motion.robot import Robot
 from cpg_ros.motion.robot_file import load_robot, RobotError
 from cpg_ros.motion.rotations import matrix_of, rotation
-from cpg_ros.ros.panel.pages import LONGEST
+from cpg_ros.ros.panel.pages import MAX_MESSAGE_LENGTH
 from cpg_ros.simulation.robot_model import engine, load
 from cpg_ros.simulation.urdf_model import to_urdf
 import numpy as np
 
 #: Colour of what has none.
 GREY = (0.62, 0.65, 0.70)
-#: GRAINS: vertices closer than this are merged, m, tried one after another until a mesh has at
-#: most MOST triangles: a page draws a robot, not its screws.
-GRAINS, MOST = (1e-5, 0.002, 0.004, 0.008), 30_000
-#: STEPS: number of steps of a coordinate within a mesh.
-STEPS = 65535
+#: MERGE_DISTANCES: vertices closer than this are merged, m, tried one after another until a mesh
+#: has at most MAX_MESH_TRIANGLES triangles: a page draws a robot, not its screws.
+MERGE_DISTANCES, MAX_MESH_TRIANGLES = (1e-5, 0.002, 0.004, 0.008), 30_000
+#: NUM_STEPS: number of steps of a coordinate within a mesh.
+NUM_STEPS = 65535
 
 
 @dataclass
@@ -96,7 +96,7 @@ class Part:
             return message
         points = self.mesh.points
         low = points.min(axis=0)
-        step = max(float(np.ptp(points, axis=0).max()) / STEPS, 1e-9)
+        step = max(float(np.ptp(points, axis=0).max()) / NUM_STEPS, 1e-9)
         return {**message, 'low': low.tolist(), 'step': step,
                 'points': _base64(np.round((points - low) / step).astype('<u2')),
                 'triangles': _base64(self.mesh.triangles.astype('<u4'))}
@@ -173,9 +173,9 @@ def _base64(values: np.ndarray) -> str:
 
 def drawable(mesh: Mesh) -> Mesh:
     """Return a mesh with shared vertices, coarser where it has more triangles than are drawn."""
-    for grain in GRAINS:
+    for grain in MERGE_DISTANCES:
         coarse = merged(mesh, grain)
-        if len(coarse.triangles) <= MOST:
+        if len(coarse.triangles) <= MAX_MESH_TRIANGLES:
             break
     return coarse
 
@@ -190,10 +190,10 @@ def along(start: np.ndarray, end: np.ndarray, radius: float, colour: tuple[float
 
 # A stick figure for a robot of which only legs and joints are known.
 
-#: LONG, WIDE: half the distance between hips along and across the body, m; LEG: length of a leg,
-#: m.
-LONG, WIDE, LEG = 0.24, 0.11, 0.42
-BODY, STICK, FOOT = (0.22, 0.33, 0.45), (0.75, 0.78, 0.82), (0.20, 0.20, 0.20)
+#: HALF_LENGTH, HALF_WIDTH: half the distance between hips along and across the body, m;
+#: LEG_LENGTH: length of a leg, m.
+HALF_LENGTH, HALF_WIDTH, LEG_LENGTH = 0.24, 0.11, 0.42
+BODY_COLOUR, LEG_COLOUR, FOOT_COLOUR = (0.22, 0.33, 0.45), (0.75, 0.78, 0.82), (0.20, 0.20, 0.20)
 
 
 def stick_figure(name: str, legs: Mapping[str, Sequence[str]], robot: Robot | None) -> Shape:
@@ -211,28 +211,29 @@ def stick_figure(name: str, legs: Mapping[str, Sequence[str]], robot: Robot | No
     for leg in legs:
         girdle, side = ((robot.girdles.get(leg, ''), robot.sides.get(leg, '')) if robot else
                         ({'h': 'hind', 'f': 'fore'}.get(leg[1:], ''), leg))
-        hips[leg] = np.array([{'fore': LONG, 'hind': -LONG}.get(girdle, 0.0),
-                              -WIDE if side[:1] == 'r' else WIDE, 0.0])
+        hips[leg] = np.array([{'fore': HALF_LENGTH, 'hind': -HALF_LENGTH}.get(girdle, 0.0),
+                              -HALF_WIDTH if side[:1] == 'r' else HALF_WIDTH, 0.0])
     long = max((abs(hip[0]) for hip in hips.values()), default=0.0)
     base = Link('base', -1, parts=[
-        Part('box', np.array([long + 0.06, 0.7 * WIDE, 0.05]), None, BODY),
-        Part('box', np.array([0.02, 0.04, 0.02]), None, STICK,
+        Part('box', np.array([long + 0.06, 0.7 * HALF_WIDTH, 0.05]), None, BODY_COLOUR),
+        Part('box', np.array([0.02, 0.04, 0.02]), None, LEG_COLOUR,
              np.array([long + 0.08, 0.0, 0.02]))])
     shape = Shape(f"stick figure of '{name}'", [base])
     for leg, joints in legs.items():
         parent, position = 0, hips[leg]
-        base.parts.append(along(position * [1.0, 0.0, 0.0], position, 0.025, BODY))
+        base.parts.append(along(position * [1.0, 0.0, 0.0], position, 0.025, BODY_COLOUR))
         swinging = joints[1:] if len(joints) >= 3 else joints
         for joint in joints:
             swings = joint in swinging
-            tip = (np.array([0.0, 0.0, -LEG / len(swinging)]) if swings else
+            tip = (np.array([0.0, 0.0, -LEG_LENGTH / len(swinging)]) if swings else
                    np.array([0.0, 0.3 * hips[leg][1], 0.0]))
             link = Link(joint, parent, joint, position=position, axis=np.eye(3)[int(swings)],
-                        parts=[along(np.zeros(3), tip, 0.018, STICK),
-                               Part('sphere', np.array([0.028]), None, BODY)])
+                        parts=[along(np.zeros(3), tip, 0.018, LEG_COLOUR),
+                               Part('sphere', np.array([0.028]), None, BODY_COLOUR)])
             shape.links.append(link)
             parent, position = len(shape.links) - 1, tip
-        shape.links[parent].parts.append(Part('sphere', np.array([0.026]), None, FOOT, position))
+        shape.links[parent].parts.append(
+            Part('sphere', np.array([0.026]), None, FOOT_COLOUR, position))
         shape.feet[leg] = parent, position
     return shape
 
@@ -240,7 +241,7 @@ def stick_figure(name: str, legs: Mapping[str, Sequence[str]], robot: Robot | No
 # The shape of a robot from its MuJoCo model, as robot_sim uses it.
 
 #: Kinds of geoms that are drawn.
-KINDS = 'mesh', 'box', 'sphere', 'ellipsoid', 'capsule', 'cylinder'
+GEOM_TYPES = 'mesh', 'box', 'sphere', 'ellipsoid', 'capsule', 'cylinder'
 #: Geoms of these groups and above are for collisions, by the custom of the models.
 COLLISION_GROUP = 3
 
@@ -278,7 +279,7 @@ def _draw(mujoco: Any, model: Any, body: int, link: Link) -> None:
         material = model.geom_matid[k]
         colour = model.mat_rgba[material] if material >= 0 else model.geom_rgba[k]
         kind = mujoco.mjtGeom(model.geom_type[k]).name.removeprefix('mjGEOM_').lower()
-        if colour[3] > 0.05 and kind in KINDS:
+        if colour[3] > 0.05 and kind in GEOM_TYPES:
             link.parts.append(Part(
                 kind, model.geom_size[k].copy(), _mesh(model, k) if kind == 'mesh' else None,
                 tuple(colour[:3]), model.geom_pos[k] - origin, matrix_of(model.geom_quat[k])))
@@ -294,14 +295,14 @@ def _mesh(model: Any, k: int) -> Mesh:
 
 # The shape of a robot from its URDF, a file or the text on ``robot_description``.
 
-#: LARGEST: largest text on ``robot_description``, bytes; TRIANGLES: most triangles that are drawn;
-#: MESHES: most bytes of all meshes.
-LARGEST, TRIANGLES, MESHES = 4_000_000, 100_000, 500_000_000
+#: MAX_DESCRIPTION_BYTES: largest text on ``robot_description``, bytes; MAX_TRIANGLES: most
+#: triangles that are drawn; MAX_MESH_BYTES: most bytes of all meshes.
+MAX_DESCRIPTION_BYTES, MAX_TRIANGLES, MAX_MESH_BYTES = 4_000_000, 100_000, 500_000_000
 #: Triangles of a solid as the page draws it.
-SOLIDS = {'box': 12, 'cylinder': 96, 'sphere': 720, 'capsule': 816}
-#: FURTHEST: nothing that is drawn is longer or further away, m; THIN: half the least width of a
-#: box in place of what is missing, m.
-FURTHEST, THIN = 1e4, 0.01
+SOLID_TRIANGLES = {'box': 12, 'cylinder': 96, 'sphere': 720, 'capsule': 816}
+#: MAX_DISTANCE: nothing that is drawn is longer or further away, m; MIN_HALF_WIDTH: half the least
+#: width of a box in place of what is missing, m.
+MAX_DISTANCE, MIN_HALF_WIDTH = 1e4, 0.01
 
 
 def from_text(text: str, source: str, report: Callable[[str], None]) -> Shape:
@@ -315,9 +316,9 @@ def from_text(text: str, source: str, report: Callable[[str], None]) -> Shape:
 
     """
     data = text.encode(errors='replace')
-    if len(data) > LARGEST:
+    if len(data) > MAX_DESCRIPTION_BYTES:
         raise DescriptionError(f'URDF {source}: has {len(data) / 1e6:.4g} MB, more than the '
-                        f'{LARGEST / 1e6:g} MB that are read')
+                        f'{MAX_DESCRIPTION_BYTES / 1e6:g} MB that are read')
     return _shape(parse_tree(data, source), source, None, report)
 
 
@@ -371,8 +372,8 @@ def _shape(tree: Xml.Element, source: str, path: Path | None, report: Callable[[
             if not link.parts:
                 points = np.array([np.zeros(3), *ends.get(index, ())])
                 low, high = points.min(axis=0), points.max(axis=0)
-                link.parts.append(Part('box', np.maximum(0.5 * (high - low), THIN), None, GREY,
-                                       0.5 * (low + high)))
+                link.parts.append(Part('box', np.maximum(0.5 * (high - low), MIN_HALF_WIDTH),
+                                       None, GREY, 0.5 * (low + high)))
         errors += failed
     if kind == 'collision' and any(link.parts for link in shape.links):
         report(f'drawn by its collision shapes: URDF {source} has no visual ones')
@@ -387,8 +388,8 @@ def _numbers(text: str | None, default: str) -> np.ndarray:
     """Return as many numbers as the default has."""
     count = len(default.split())
     values = np.array(numbers(text or default, count))
-    if not len(values) or not (np.abs(values) < FURTHEST).all():
-        raise MeshError(f"'{(text or '')[:40]}' is not {count} numbers below {FURTHEST:g}")
+    if not len(values) or not (np.abs(values) < MAX_DISTANCE).all():
+        raise MeshError(f"'{(text or '')[:40]}' is not {count} numbers below {MAX_DISTANCE:g}")
     return values
 
 
@@ -400,7 +401,7 @@ class _Drawing:
         self._colours = {material.get('name', ''): material
                          for material in tree.findall('material')}
         self._meshes: dict[Path, Mesh] = {}
-        self._bytes, self._remaining = 0, TRIANGLES
+        self._bytes, self._remaining = 0, MAX_TRIANGLES
 
     def add_all(self, link: Link, visuals: Sequence[Xml.Element]) -> list[str]:
         """Add visuals to their link; return why some cannot be drawn."""
@@ -420,9 +421,9 @@ class _Drawing:
         for solid in visual.iterfind('geometry/*'):
             part = self._part(solid)
             part.colour, part.position, part.pose = colour, position, rotation(tuple(angles))
-            count = SOLIDS[part.kind] if part.mesh is None else len(part.mesh.triangles)
+            count = SOLID_TRIANGLES[part.kind] if part.mesh is None else len(part.mesh.triangles)
             if count > self._remaining:
-                raise MeshError(f'what exceeds {TRIANGLES} triangles of the whole robot')
+                raise MeshError(f'what exceeds {MAX_TRIANGLES} triangles of the whole robot')
             self._remaining -= count
             link.parts.append(part)
 
@@ -444,8 +445,8 @@ class _Drawing:
         name = solid.get('filename', '')
         points, triangles = self._mesh(name)
         points = points * _numbers(solid.get('scale'), '1 1 1')
-        if not (np.abs(points) < FURTHEST).all():
-            raise MeshError(f'{name}: a vertex is further than {FURTHEST:g} m away')
+        if not (np.abs(points) < MAX_DISTANCE).all():
+            raise MeshError(f'{name}: a vertex is further than {MAX_DISTANCE:g} m away')
         return Part('mesh', np.zeros(0), drawable(Mesh(points, triangles)))
 
     def _mesh(self, name: str) -> Mesh:
@@ -455,8 +456,8 @@ class _Drawing:
             if not len(mesh.triangles):
                 raise MeshError(f'{path}: it has no triangles')
             self._bytes += 9 * 8 * len(mesh.triangles)
-            if self._bytes > MESHES:
-                raise MeshError(f'{name}: the meshes have more than {MESHES / 1e6:g} MB')
+            if self._bytes > MAX_MESH_BYTES:
+                raise MeshError(f'{name}: the meshes have more than {MAX_MESH_BYTES / 1e6:g} MB')
             self._meshes[path] = mesh
         return self._meshes[path]
 
@@ -520,9 +521,10 @@ def find(info: RobotInfo, report: Callable[[str], None]) -> Shape:
             *(described if not info.model or _is_file(info.model) else described[::-1])):
         try:
             shape = make()
-            if shape and (size := len(json.dumps(shape.message()))) > LONGEST:
+            if shape and (size := len(json.dumps(shape.message()))) > MAX_MESSAGE_LENGTH:
                 raise ShapeError(f'{shape.source} is not drawn: its shape has {size / 1e6:.3g} '
-                                 f'MB, more than the {LONGEST / 1e6:g} MB that a page is sent')
+                                 f'MB, more than the {MAX_MESSAGE_LENGTH / 1e6:g} MB that a '
+                                 'page is sent')
         except (CpgError, OSError) as error:
             report(str(error))
             continue

@@ -33,8 +33,8 @@ from rclpy.node import Node
 
 # The lease to move a robot: at most one holder at a time, and anybody can take over.
 
-#: SILENCE: time without a command after which the holder loses the lease, s.
-SILENCE = 2.0
+#: LEASE_TIMEOUT: time without a command after which the holder loses the lease, s.
+LEASE_TIMEOUT = 2.0
 
 
 class LeaseError(CpgError):
@@ -88,7 +88,7 @@ class Lease:
     def expire(self, now: float) -> Hashable | None:
         """End the lease of a holder that has been silent for too long; return it, or None."""
         holder = self.holder
-        if holder is None or now - self._last_command <= SILENCE:
+        if holder is None or now - self._last_command <= LEASE_TIMEOUT:
             return None
         self._pass_to(None, now)
         return holder
@@ -98,12 +98,10 @@ class Lease:
         self.holder, self._last_command, self.confirmed = who, now, others
 
 
-#: HOLD: largest age of a command when it is published, s; an older one counts as zero.
-HOLD = 0.3
-#: STOPS: number of times that a stop is published, in case messages are lost.
-STOPS = 5
-#: Frame of the commands, as REP 105 names the robot's.
-FRAME = 'base_link'
+#: COMMAND_TIMEOUT: largest age of a command when it is published, s; an older one counts as zero.
+COMMAND_TIMEOUT = 0.3
+#: NUM_STOPS: number of times that a stop is published, in case messages are lost.
+NUM_STOPS = 5
 
 
 class Teleop:
@@ -178,7 +176,7 @@ class Teleop:
 
         """
         still = speed == 0.0 and turn == 0.0
-        if still or now - stamp > HOLD:
+        if still or now - stamp > COMMAND_TIMEOUT:
             # Letting go of the pad needs no lease, and gives none.
             if self.lease.holder is page:
                 self.stop()
@@ -189,7 +187,7 @@ class Teleop:
             self.stop()
             raise LeaseError(f'{self._topic} is also published by {", ".join(self.names)}: '
                              'take over to steer')
-        self._until, self._stops = stamp + HOLD, STOPS
+        self._until, self._stops = stamp + COMMAND_TIMEOUT, NUM_STOPS
         self.target = speed * self._fastest[0], turn * self._fastest[1]
 
     def stop(self) -> None:
@@ -205,7 +203,7 @@ class Teleop:
             self.close()
 
     def _send(self, now: float) -> None:
-        """Publish the target while it is fresh, then zeros, STOPS times."""
+        """Publish the target while it is fresh, then zeros, NUM_STOPS times."""
         if now > self._until:
             self.stop()
             self.target = 0.0, 0.0
@@ -217,8 +215,8 @@ class Teleop:
             twist = message if self._kind is Twist else message.twist
             twist.linear.x, twist.angular.z = self.target
             if self._kind is TwistStamped:
-                # No time: the generator's may be simulated. The panel's own limit is HOLD.
-                message.header.frame_id = FRAME
+                # No time: the generator's may be simulated. The panel's limit is COMMAND_TIMEOUT.
+                message.header.frame_id = 'base_link'
             self._publisher.publish(message)
 
     # -- the topic --------------------------------------------------------------------------
@@ -267,6 +265,6 @@ class Teleop:
         holder = self.lease.holder
         return {'type': 'lease', 'page': str(page), 'holder': str(holder or ''),
                 'yours': holder is page, 'lost_to': page.lost_to, 'stop_only': page.stop_only,
-                'others': self.names, 'confirmed': self.confirmed, 'limit': HOLD,
+                'others': self.names, 'confirmed': self.confirmed, 'limit': COMMAND_TIMEOUT,
                 'round_trip': round(page.round_trip, 1)
-                if page.round_trip > HOLD else None}
+                if page.round_trip > COMMAND_TIMEOUT else None}

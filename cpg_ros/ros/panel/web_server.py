@@ -38,9 +38,9 @@ from websockets.http11 import Request, Response
 AUTO = 'auto'
 #: Least number of characters of a token: that of 128 bits, 6 bits each. Guesses are not delayed: a
 #: delay of an address would also lock out the holder of the token behind the same address.
-SHORTEST = 22
+MIN_TOKEN_LENGTH = 22
 #: How to generate a token.
-RECIPE = 'python3 -c "import secrets; print(secrets.token_urlsafe(16))"'
+TOKEN_COMMAND = 'python3 -c "import secrets; print(secrets.token_urlsafe(16))"'
 
 
 class AccessError(CpgError):
@@ -63,14 +63,15 @@ def token_for(host: str, setting: str, terminal: bool) -> str:
     if setting == AUTO:
         if not terminal:
             raise AccessError(f'token:={AUTO} shows the token in the terminal, and there is none: '
-                              f'make one ({RECIPE}) and set it in a parameter file')
+                              f'make one ({TOKEN_COMMAND}) and set it in a parameter file')
         return secrets.token_urlsafe(16)
     if not setting and not is_loopback(host):
         raise AccessError(f"host '{host}' can be reached from other machines: set the parameter "
                           f'token to protect it; token:={AUTO} makes one')
-    if setting and len(setting) < SHORTEST:
-        raise AccessError(f'the token has {len(setting)} characters, and can be guessed: it '
-                          f'needs {SHORTEST}; token:={AUTO} makes one, or: {RECIPE}')
+    if setting and len(setting) < MIN_TOKEN_LENGTH:
+        raise AccessError(f'the token has {len(setting)} characters, and can be guessed: '
+                          f'it needs {MIN_TOKEN_LENGTH}; token:={AUTO} makes one, or: '
+                          f'{TOKEN_COMMAND}')
     return setting
 
 
@@ -99,15 +100,15 @@ def rejected(token: str, path: str, host: str, origin: str) -> str:
     return ''
 
 
-FILES = Path(__file__).parent / 'page'
-TYPES = {'.html': 'text/html', '.css': 'text/css', '.js': 'text/javascript',
+PAGE_FOLDER = Path(__file__).parent / 'page'
+CONTENT_TYPES = {'.html': 'text/html', '.css': 'text/css', '.js': 'text/javascript',
          '.svg': 'image/svg+xml'}
 #: Largest size of a request, bytes.
-LONGEST = 4096
+MAX_REQUEST_SIZE = 4096
 #: Path of recordings.
-BAGS = '/bags/'
-#: POLICY: keeps the browser from loading anything from elsewhere.
-POLICY = ("default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; "
+BAGS_PATH = '/bags/'
+#: CONTENT_POLICY: keeps the browser from loading anything from elsewhere.
+CONTENT_POLICY = ("default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; "
           "connect-src 'self' ws: wss:; base-uri 'none'; form-action 'none'; "
           "frame-ancestors 'none'")
 #: Logger whose records are dropped: errors of clients would fill the log.
@@ -126,13 +127,13 @@ class WebServer:
         self._token, self._pages, self._bag = token, pages, bag
         self._come, self._on_request, self._gone = come, on_request, gone
         self._files = {'/' if file.name == 'index.html' else f'/{file.name}':
-                       (file.read_bytes(), TYPES[file.suffix])
-                       for file in FILES.iterdir() if file.suffix in TYPES}
+                       (file.read_bytes(), CONTENT_TYPES[file.suffix])
+                       for file in PAGE_FOLDER.iterdir() if file.suffix in CONTENT_TYPES}
 
     async def start(self, bound: socket) -> Server:
         """Serve at a socket; return the server."""
         return await serve(self._page, sock=bound, process_request=self._answer,
-                           compression=None, max_size=LONGEST, max_queue=8,
+                           compression=None, max_size=MAX_REQUEST_SIZE, max_queue=8,
                            write_limit=65536, open_timeout=5.0, ping_interval=10.0,
                            ping_timeout=20.0, close_timeout=1.0, server_header=None,
                            logger=_LOG)
@@ -152,9 +153,9 @@ class WebServer:
             if self._pages.full:
                 return _text(HTTPStatus.SERVICE_UNAVAILABLE, 'too many pages are open')
             return None
-        if path.startswith(BAGS) and path.endswith('.zip'):
+        if path.startswith(BAGS_PATH) and path.endswith('.zip'):
             try:
-                bag = path.removeprefix(BAGS).removesuffix('.zip')
+                bag = path.removeprefix(BAGS_PATH).removesuffix('.zip')
                 return _response(HTTPStatus.OK, await asyncio.to_thread(self._bag, bag),
                                  'application/zip')
             except ValueError as error:
@@ -188,7 +189,7 @@ def _text(status: HTTPStatus, text: str) -> Response:
 
 def _response(status: HTTPStatus, body: bytes, kind: str) -> Response:
     headers = {'Content-Type': kind, 'Content-Length': str(len(body)),
-               'Content-Security-Policy': POLICY, 'X-Content-Type-Options': 'nosniff',
+               'Content-Security-Policy': CONTENT_POLICY, 'X-Content-Type-Options': 'nosniff',
                'Referrer-Policy': 'no-referrer', 'Cache-Control': 'no-cache',
                'Connection': 'close'}
     return Response(status.value, status.phrase, Headers(headers), body)

@@ -16,7 +16,7 @@
 
 from types import SimpleNamespace
 
-from cpg_ros.ros.node.health import NAMELESS, others_on
+from cpg_ros.ros.node.health import others_on, UNKNOWN_NODE
 import pytest
 
 BRIDGE, WATCHDOG = ('/', 'unitree_bridge'), ('/', 'unitree_watchdog')
@@ -41,8 +41,8 @@ def others(publishers, tolerated):
     ([BRIDGE, WATCHDOG, ('/', 'rival')], '/rival'), ([BRIDGE, ('/lab', 'rival')], '/lab/rival'),
     ([BRIDGE, WATCHDOG, BRIDGE], '/unitree_bridge'), ([BRIDGE, BARE], 'a program without ROS'),
     # The watchdog's name may come later than its publisher.
-    ([BRIDGE, UNKNOWN], ''), ([BRIDGE, WATCHDOG, UNKNOWN], NAMELESS),
-    ([BRIDGE, UNKNOWN, UNKNOWN], NAMELESS)])
+    ([BRIDGE, UNKNOWN], ''), ([BRIDGE, WATCHDOG, UNKNOWN], UNKNOWN_NODE),
+    ([BRIDGE, UNKNOWN, UNKNOWN], UNKNOWN_NODE)])
 def test_who_else_commands(publishers, found):
     assert others(publishers, 0) == found
 

@@ -27,7 +27,7 @@ from cpg_ros.motion.robot_file import load_robot  # noqa: E402
 from cpg_ros.networks.registry import NETWORKS  # noqa: E402
 from cpg_ros.ros.generator_parameters import gait_spec  # noqa: E402
 from cpg_ros.ros.node.parameters import choices, untuned_among  # noqa: E402
-from cpg_ros.ros.panel.pages import LONGEST_REQUEST, read, RequestError  # noqa: E402
+from cpg_ros.ros.panel.pages import MAX_TEXT_LENGTH, read, RequestError  # noqa: E402
 from cpg_ros.ros.panel.robot_view import unit  # noqa: E402
 from cpg_ros.ros.panel.web_server import AccessError, rejected, token_for  # noqa: E402
 
@@ -101,7 +101,7 @@ def test_the_token_does_from_anywhere_but_another_sites_page():
     '{"do": "push", "force": -1, "direction": 0}', '{"do": "push", "force": 1e6, "direction": 0}',
     '{"do": "enable", "on": 1}', '{"do": "enable", "on": "true"}', '{"do": "record", "on": null}',
     '{"do": "set", "name": "a\\u0000b", "value": 1}', '[' * 4000, b'\x00\xff', b'{"do": "stop"}',
-    json.dumps({'do': 'choose', 'node': 'x' * (LONGEST_REQUEST + 1)})])
+    json.dumps({'do': 'choose', 'node': 'x' * (MAX_TEXT_LENGTH + 1)})])
 def test_what_is_not_understood(text):
     with pytest.raises(RequestError) as refused:
         read(text)

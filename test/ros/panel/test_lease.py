@@ -14,7 +14,7 @@
 
 """Who may move a robot."""
 
-from cpg_ros.ros.panel.teleop import Lease, LeaseError, SILENCE
+from cpg_ros.ros.panel.teleop import Lease, LEASE_TIMEOUT, LeaseError
 import pytest
 
 
@@ -50,11 +50,11 @@ def test_a_holder_that_is_silent_loses_it():
     lease = Lease()
     assert lease.expire(100.0) is None
     lease.acquire('page 1', 100.0)
-    assert lease.expire(100.0 + SILENCE) is None
+    assert lease.expire(100.0 + LEASE_TIMEOUT) is None
     lease.renew('page 1', 101.0)
     lease.renew('page 2', 109.0)
-    assert lease.expire(101.0 + SILENCE) is None and lease.holder == 'page 1'
-    assert lease.expire(101.1 + SILENCE) == 'page 1' and lease.holder is None
+    assert lease.expire(101.0 + LEASE_TIMEOUT) is None and lease.holder == 'page 1'
+    assert lease.expire(101.1 + LEASE_TIMEOUT) == 'page 1' and lease.holder is None
     lease.acquire('page 2', 200.0)
     assert lease.expire(200.0) is None
 

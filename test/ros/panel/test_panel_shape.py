@@ -112,7 +112,7 @@ def test_a_page_gets_a_mesh_with_shared_vertices_to_a_65535th_of_its_size():
     sheet = Mesh(np.stack([x, y, 0.0 * x], -1).reshape(-1, 3), np.concatenate([
         np.stack([k, k + 1, k + 200], -1), np.stack([k + 1, k + 201, k + 200], -1)]))
     drawn = shapes.drawable(sheet)
-    assert 10_000 < len(drawn.triangles) <= shapes.MOST
+    assert 10_000 < len(drawn.triangles) <= shapes.MAX_MESH_TRIANGLES
     np.testing.assert_allclose(np.ptp(drawn.points, axis=0), [0.199, 0.199, 0.0], atol=0.004)
 
 
@@ -326,6 +326,6 @@ def test_a_stick_figure_of_what_topics_alone_tell():
         foot = standing[link] @ [*place, 1.0]
         assert np.sign(foot[:2]).tolist() == [ahead, left]
         heights.append(foot[2])
-    np.testing.assert_allclose(heights, -shapes.LEG)
+    np.testing.assert_allclose(heights, -shapes.LEG_LENGTH)
     message = shape.message()
     assert message['type'] == 'shape' and len(message['links']) == 6

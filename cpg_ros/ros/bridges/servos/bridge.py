@@ -32,13 +32,13 @@ from cpg_ros.ros.node.parameters import fixed, Spec
 import numpy as np
 
 NAME = Servos.bridge_name()
-#: ABSENT: settings of a bridge that this one lacks: servos limit their torque themselves and
+#: UNSUPPORTED: settings of a bridge that this one lacks: servos limit their torque themselves and
 #: measure no tilt or temperature.
-ABSENT = 'torque_factor', 'feedforward', 'tilt', 'hottest', 'sensor_rate'
+UNSUPPORTED = 'torque_factor', 'feedforward', 'tilt', 'hottest', 'sensor_rate'
 SPECS = fixed({
     **{name: spec for name, spec in bridge_specs('', calibration=Spec(
         '', 'calibration file of the servos', constraints='the path of a YAML file')).items()
-       if name not in ABSENT},
+       if name not in UNSUPPORTED},
     'rate': Spec(50.0, 'commands per second [Hz]', 10.0, 200.0),
     # Servos that hold their last angle do not mind a computer that is late.
     'state_timeout': Spec(0.5, 'time without a new state, or without a tick of the bridge, after '

@@ -121,13 +121,13 @@ SPECS = fixed({
                         'they do when the bridge has made the robot sit down [s]; 0 disables '
                         'servo torque at once', 0.0, 30.0)})
 #: Least time between two warnings that a servo does not answer, s.
-QUIET = 5.0
-#: QUEUE: most commands that wait for a tick.
-QUEUE = 100
-#: CHECK: period in which the graph is checked for others who command the servos, s.
-CHECK = 0.25
-#: SHOWN: time for which /diagnostics reports a refused command, s.
-SHOWN = 2.0
+WARNING_PERIOD = 5.0
+#: QUEUE_DEPTH: most commands that wait for a tick.
+QUEUE_DEPTH = 100
+#: CHECK_PERIOD: period in which the graph is checked for others who command the servos, s.
+CHECK_PERIOD = 0.25
+#: REPORT_TIME: time for which /diagnostics reports a refused command, s.
+REPORT_TIME = 2.0
 
 
 class ServoBus(StartedNode):
@@ -154,7 +154,7 @@ class ServoBus(StartedNode):
         self._timeout: float = self._value('command_timeout')
         # Leave room for the commands of other senders, which must not displace the owner's.
         self._commands = PolledSubscription(self, Float64MultiArray, Servos.command_topic,
-                                            QoSProfile(depth=QUEUE))
+                                            QoSProfile(depth=QUEUE_DEPTH))
         self._owner = CommandOwner(Servos.watchdog_name())
         self._publisher = self.create_publisher(JointState, Servos.state_topic, command_qos())
         #: Assumed angles of servos that cannot be read, rad: at rest until they are commanded.
@@ -167,7 +167,7 @@ class ServoBus(StartedNode):
         self.thread = self._ticker = Ticker(self, self._value('rate'), self._tick, lambda: None,
                                             self._failed, lambda _: None)
         self._health = HealthPublisher(self, 'bus', self._calibration.board, self._report_health)
-        self._timer = self.create_timer(CHECK, self._check_senders, clock=STEADY)
+        self._timer = self.create_timer(CHECK_PERIOD, self._check_senders, clock=STEADY)
         self._warn_of_unknown()
 
     @property
@@ -183,7 +183,7 @@ class ServoBus(StartedNode):
     def _report_health(self) -> Health:
         level, text = DiagnosticStatus.OK, ('driven' if self._driven else
                                             f'servo torque disabled: {self._reason}')
-        if time.monotonic() < self._refused_at + SHOWN:
+        if time.monotonic() < self._refused_at + REPORT_TIME:
             level, text = DiagnosticStatus.ERROR, self._refusal
         elif self._others:
             level = DiagnosticStatus.ERROR
@@ -202,7 +202,8 @@ class ServoBus(StartedNode):
         if self._reads:
             units = self._board.read()
             if units is None:
-                self.get_logger().warning('not all servos answer', throttle_duration_sec=QUIET)
+                self.get_logger().warning('not all servos answer',
+                                          throttle_duration_sec=WARNING_PERIOD)
                 return
             angles = self._calibration.angles(units)
         # Without states, a bridge whose commands are refused stops following.
@@ -237,7 +238,7 @@ class ServoBus(StartedNode):
 
     def _refuse(self, reason: str, now: float) -> None:
         self._refusal, self._refused_at = f'refused: {reason}', now
-        self.get_logger().error(self._refusal, throttle_duration_sec=QUIET)
+        self.get_logger().error(self._refusal, throttle_duration_sec=WARNING_PERIOD)
 
     def _release(self, reason: str, blocked: str | None) -> None:
         """Disable torque; the sender ``blocked``, if any, must disable it, too."""

@@ -44,13 +44,14 @@ class Kind:
     options: Mapping[str, tuple[float, float, float]]
 
 
-_SERIAL = {'baud': (1_000_000, 9600, 4_000_000)}
+_SERIAL_SETTINGS = {'baud': (1_000_000, 9600, 4_000_000)}
 #: BOARDS: name of a board -> its kind. A pulse is limited by its period, too.
 BOARDS = {'pca9685': Kind(15, 20_000, {'address': (0x40, 0x03, 0x77),
                                        'frequency': (50.0, 40.0, 400.0)}),
-          'dynamixel': Kind(252, 4095, _SERIAL), 'feetech_sts': Kind(253, 4095, _SERIAL),
-          'feetech_scs': Kind(253, 1023, _SERIAL)}
-_SERVO = {'channel', 'centre', 'direction', 'per_rad', 'lower', 'upper', 'rest'}
+          'dynamixel': Kind(252, 4095, _SERIAL_SETTINGS),
+          'feetech_sts': Kind(253, 4095, _SERIAL_SETTINGS),
+          'feetech_scs': Kind(253, 1023, _SERIAL_SETTINGS)}
+_SERVO_KEYS = {'channel', 'centre', 'direction', 'per_rad', 'lower', 'upper', 'rest'}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -95,8 +96,8 @@ class Calibration(ShortRepr):
 class _Reader(YamlReader):
     def servo(self, tree: Any, name: str, kind: Kind, most: float) -> list[float]:
         where = f'servos.{name}'
-        tree = self.keys(tree, where, _SERVO)
-        value = {key: self.number(tree[key], f'{where}.{key}') for key in sorted(_SERVO)}
+        tree = self.keys(tree, where, _SERVO_KEYS)
+        value = {key: self.number(tree[key], f'{where}.{key}') for key in sorted(_SERVO_KEYS)}
         channel = tree['channel']
         if type(channel) is not int or not 0 <= channel <= kind.last:
             raise self.fail(f'{where}.channel',

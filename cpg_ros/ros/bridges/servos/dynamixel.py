@@ -23,15 +23,15 @@ from collections.abc import Iterator, Sequence
 from cpg_ros.ros.bridges.servos.serial_board import Reply, ServoProtocol
 
 HEADER = b'\xff\xff\xfd\x00'
-#: Byte stuffing: LOOKALIKE, data that look like a header, is sent as STUFFED.
-LOOKALIKE, STUFFED = b'\xff\xff\xfd', b'\xff\xff\xfd\xfd'
+#: Byte stuffing: UNSTUFFED, data that look like a header, is sent as STUFFED.
+UNSTUFFED, STUFFED = b'\xff\xff\xfd', b'\xff\xff\xfd\xfd'
 BROADCAST = 0xFE
 #: Codes of instructions.
 STATUS, SYNC_READ, SYNC_WRITE = 0x55, 0x82, 0x83
 #: Fields of the control table: address and length in bytes.
 TORQUE_ENABLE, GOAL_POSITION, PRESENT_POSITION = (64, 1), (116, 4), (132, 4)
-#: HEAD: bytes of a packet before its instruction; LONGEST: largest length of an expected answer.
-HEAD, LONGEST = 7, 64
+#: PREAMBLE_SIZE: bytes of a packet before its instruction; MAX_LENGTH: of an expected answer.
+PREAMBLE_SIZE, MAX_LENGTH = 7, 64
 
 
 def _crc_table() -> tuple[int, ...]:
@@ -45,20 +45,20 @@ def _crc_table() -> tuple[int, ...]:
     return tuple(table)
 
 
-_TABLE = _crc_table()
+_CRC_TABLE = _crc_table()
 
 
 def crc(data: bytes) -> int:
     """Return the check sum of a packet without its last two bytes."""
     value = 0
     for byte in data:
-        value = ((value << 8) & 0xFFFF) ^ _TABLE[(value >> 8) ^ byte]
+        value = ((value << 8) & 0xFFFF) ^ _CRC_TABLE[(value >> 8) ^ byte]
     return value
 
 
 def packet(servo: int, instruction: int, parameters: bytes = b'') -> bytes:
     """Return a packet: stuffed first, then its length, then its check sum."""
-    body = bytes((instruction, *parameters)).replace(LOOKALIKE, STUFFED)
+    body = bytes((instruction, *parameters)).replace(UNSTUFFED, STUFFED)
     data = HEADER + bytes((servo,)) + (len(body) + 2).to_bytes(2, 'little') + body
     return data + crc(data).to_bytes(2, 'little')
 
@@ -94,17 +94,18 @@ class Dynamixel(ServoProtocol):
         """Remove and return all status packets with a right check sum."""
         while (start := received.find(HEADER)) >= 0:
             del received[:start]
-            if len(received) < HEAD:
+            if len(received) < PREAMBLE_SIZE:
                 return
             length = int.from_bytes(received[5:7], 'little')
-            end = HEAD + length
-            if length > LONGEST or (len(received) >= end and crc(bytes(received[:end - 2]))
+            end = PREAMBLE_SIZE + length
+            if length > MAX_LENGTH or (len(received) >= end and crc(bytes(received[:end - 2]))
                                     != int.from_bytes(received[end - 2:end], 'little')):
                 del received[:len(HEADER)]
                 continue
             if len(received) < end:
                 return
-            servo, body = received[4], bytes(received[HEAD:end - 2]).replace(STUFFED, LOOKALIKE)
+            servo = received[4]
+            body = bytes(received[PREAMBLE_SIZE:end - 2]).replace(STUFFED, UNSTUFFED)
             del received[:end]
             # An adapter may return what was sent, too.
             if body[0] == STATUS:

@@ -30,10 +30,10 @@ BROADCAST = 0xFE
 READ, SYNC_READ, SYNC_WRITE = 0x02, 0x82, 0x83
 #: Fields of the memory: address and length in bytes.
 TORQUE_SWITCH, GOAL_POSITION, PRESENT_POSITION = (40, 1), (42, 2), (56, 2)
-#: SIGN: bit that marks a negative position of STS and SMS.
-SIGN = 0x8000
-#: LONGEST: largest length of an expected answer, bytes.
-LONGEST = 32
+#: SIGN_BIT: bit that marks a negative position of STS and SMS.
+SIGN_BIT = 0x8000
+#: MAX_LENGTH: largest length of an expected answer, bytes.
+MAX_LENGTH = 32
 
 
 def checksum(data: bytes) -> int:
@@ -86,7 +86,7 @@ class Feetech(ServoProtocol):
                 return
             servo, length = received[2], received[3]
             end = 4 + length
-            if servo >= BROADCAST or not 2 <= length <= LONGEST:
+            if servo >= BROADCAST or not 2 <= length <= MAX_LENGTH:
                 del received[0]
                 continue
             if len(received) < end:
@@ -104,4 +104,4 @@ class Feetech(ServoProtocol):
     def position(self, reply: Reply) -> int:
         """Return the position of an answer."""
         value = int.from_bytes(reply.data[:2], self._order)
-        return SIGN - value if self._encoder and value & SIGN else value
+        return SIGN_BIT - value if self._encoder and value & SIGN_BIT else value

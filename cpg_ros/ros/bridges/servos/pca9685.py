@@ -32,10 +32,10 @@ MODE1, LED0, ALL_OFF_H, PRE_SCALE = 0x00, 0x06, 0xFD, 0xFE
 AUTO_INCREMENT, SLEEP = 0x20, 0x10
 #: FULL_OFF: bit 4 of an OFF_H register, table 7: no pulses.
 FULL_OFF = 0x10
-#: OSCILLATOR: frequency of the internal clock, Hz; COUNTS: counts of a pulse's period.
-OSCILLATOR, COUNTS = 25e6, 4096
-#: STARTED: time until the oscillator runs once it is on, s (500 us in section 7.3.1.1).
-STARTED = 0.001
+#: CLOCK_FREQUENCY: frequency of the internal clock, Hz; NUM_COUNTS: counts of a pulse's period.
+CLOCK_FREQUENCY, NUM_COUNTS = 25e6, 4096
+#: STARTUP_TIME: time until the oscillator runs once it is on, s (500 us in section 7.3.1.1).
+STARTUP_TIME = 0.001
 #: Request of ioctl that sets the address of a device, linux/i2c-dev.h.
 I2C_SLAVE = 0x0703
 
@@ -63,7 +63,7 @@ class LinuxI2c:
 
 def prescale(frequency: float) -> int:
     """Return PRE_SCALE for a frequency of pulses, Hz: equation 1 of section 7.3.5."""
-    return round(OSCILLATOR / (COUNTS * frequency)) - 1
+    return round(CLOCK_FREQUENCY / (NUM_COUNTS * frequency)) - 1
 
 
 class Pca9685(ServoBoard):
@@ -74,13 +74,13 @@ class Pca9685(ServoBoard):
         self._bus, self._channels = bus, channels
         scale = prescale(frequency)
         # Duration of a count, us, by the rounded PRE_SCALE, not by the wanted frequency.
-        self._count = 1e6 * (scale + 1) / OSCILLATOR
+        self._count = 1e6 * (scale + 1) / CLOCK_FREQUENCY
         self.detach()
         # PRE_SCALE can be written while the oscillator is off only.
         for register, value in ((MODE1, AUTO_INCREMENT | SLEEP), (PRE_SCALE, scale),
                                 (MODE1, AUTO_INCREMENT)):
             bus.write(bytes((register, value)))
-        time.sleep(STARTED)
+        time.sleep(STARTUP_TIME)
 
     def write(self, units: np.ndarray) -> None:
         """Make pulses of these lengths, us; each begins with its period (ON is 0)."""

@@ -100,7 +100,7 @@ class SerialPort:
 
 
 #: Time in which all servos asked by one packet must have answered, s.
-ANSWER = 0.015
+RESPONSE_TIMEOUT = 0.015
 
 
 @dataclass(frozen=True)
@@ -147,12 +147,12 @@ class SerialBoard(ServoBoard):
             self._attached = True
 
     def read(self) -> np.ndarray | None:
-        """Return the positions of all servos; None if one does not answer within ANSWER s."""
+        """Return the positions of all servos; None if one exceeds RESPONSE_TIMEOUT."""
         values: dict[int, int] = {}
         for question, count in self._protocol.questions(self._servos):
             self._port.forget()
             self._port.send(question)
-            until, received = time.monotonic() + ANSWER, bytearray()
+            until, received = time.monotonic() + RESPONSE_TIMEOUT, bytearray()
             missing = len(values) + count
             while len(values) < missing and (data := self._port.receive(until)):
                 received += data

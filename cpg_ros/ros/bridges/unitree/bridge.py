@@ -121,9 +121,9 @@ INTERFACES: dict[str, type[Unitree]] = {'g1': UnitreeG1, 'h1_2': UnitreeH12}
 _VENDOR = b'\x01\x10'
 #: Host, version and system in a zero-terminated string.
 _VERSION = re.compile(rb'([\x20-\x7e]+)/(\d+)\.(\d+)\.\d+/\w+/\w+\0')
-_GROUP = '239.255.0.1'
-#: HARMFUL: first major version of Cyclone DDS whose announcements crash the robot's firmware.
-HARMFUL = 11
+_MULTICAST_GROUP = '239.255.0.1'
+#: First major version of Cyclone DDS whose announcements crash the robot's firmware.
+HARMFUL_VERSION = 11
 
 
 def harmful(packet: bytes) -> str:
@@ -131,7 +131,7 @@ def harmful(packet: bytes) -> str:
     if packet[:4] != b'RTPS' or packet[6:8] != _VENDOR:
         return ''
     for host, major, minor in _VERSION.findall(packet):
-        if int(major) >= HARMFUL:
+        if int(major) >= HARMFUL_VERSION:
             return f'cyclonedds {int(major)}.{int(minor)} on {host.decode()}'
     return ''
 
@@ -146,7 +146,7 @@ class Announcements:
         try:
             self._socket.bind(('', 7400 + 250 * domain))
             for index, _ in socket.if_nameindex():
-                group = struct.pack('4s4si', socket.inet_aton(_GROUP), bytes(4), index)
+                group = struct.pack('4s4si', socket.inet_aton(_MULTICAST_GROUP), bytes(4), index)
                 # An interface without multicast has no announcements.
                 with suppress(OSError):
                     self._socket.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, group)
@@ -271,10 +271,10 @@ class Sensors:
 #: Identifiers of requests. CHECK_MODE, RELEASE_MODE: of the service motion_switcher; STAND_DOWN:
 #: of the service sport.
 CHECK_MODE, RELEASE_MODE, STAND_DOWN = 1001, 1003, 1005
-#: ANSWER: longest time for an answer, s; RELEASED: longest time to release all modes, s.
-ANSWER, RELEASED = 3.0, 30.0
-#: LYING: time that the robot needs to lie down, s; SETTLING: time to release a mode afterwards, s.
-LYING, SETTLING = 4.0, 1.0
+#: RESPONSE_TIMEOUT: of a request, s; RELEASE_TIMEOUT: of the release of all modes, s.
+RESPONSE_TIMEOUT, RELEASE_TIMEOUT = 3.0, 30.0
+#: LIE_DOWN_TIME: of the robot, s; SETTLING_TIME: after the release of a mode, s.
+LIE_DOWN_TIME, SETTLING_TIME = 4.0, 1.0
 
 
 class RobotService:
@@ -300,7 +300,7 @@ class RobotService:
         request.header.identity.id = time.monotonic_ns()
         request.header.identity.api_id = number
         request.parameter = '{}'
-        end = time.monotonic() + ANSWER
+        end = time.monotonic() + RESPONSE_TIMEOUT
         while not (self._publisher.get_subscription_count()
                    and self._node.count_publishers(self._answers.topic)):
             if time.monotonic() > end:
@@ -308,7 +308,7 @@ class RobotService:
                                    'none: motion_switcher:=false')
             self._wait(0.05)
         self._publisher.publish(request)
-        while time.monotonic() < end + ANSWER:
+        while time.monotonic() < end + RESPONSE_TIMEOUT:
             for answer, _ in self._answers.receive():
                 if answer.header.identity.id == request.header.identity.id:
                     if code := answer.header.status.code:
@@ -333,7 +333,7 @@ def release(node: Node, lies: bool, wait: Wait, log: Callable[[str], None]) -> N
 
     """
     switcher = RobotService(node, 'motion_switcher', wait)
-    sport, end = None, time.monotonic() + RELEASED
+    sport, end = None, time.monotonic() + RELEASE_TIMEOUT
     while name := switcher.call(CHECK_MODE).get('name', ''):
         if time.monotonic() > end:
             raise StartRefused(f"the robot does not release its motion mode '{name}'")
@@ -341,10 +341,10 @@ def release(node: Node, lies: bool, wait: Wait, log: Callable[[str], None]) -> N
             sport = RobotService(node, 'sport', wait)
             log(f"its motion mode '{name}' is active: it is asked to lie down")
             sport.call(STAND_DOWN)
-            wait(LYING)
+            wait(LIE_DOWN_TIME)
         log(f"its motion mode '{name}' is to be released")
         switcher.call(RELEASE_MODE)
-        wait(SETTLING)
+        wait(SETTLING_TIME)
     log('no motion mode of its own is active')
 
 

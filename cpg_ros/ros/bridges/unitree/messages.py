@@ -156,7 +156,7 @@ def settings_of(robot: Robot, model: Model, kp: list[float], kd: list[float],
 # The check sum of Unitree's low-level commands: CRC-32/MPEG-2 of the words of a C struct.
 
 #: Every byte with its bits the other way round.
-_MIRRORED = bytes(int(f'{byte:08b}'[::-1], 2) for byte in range(256))
+_REVERSED_BITS = bytes(int(f'{byte:08b}'[::-1], 2) for byte in range(256))
 
 
 def crc32(data: bytes) -> int:
@@ -169,14 +169,14 @@ def crc32(data: bytes) -> int:
     swapped = bytearray(len(data))
     for k in range(4):
         swapped[k::4] = data[3 - k::4]
-    reflected = zlib.crc32(swapped.translate(_MIRRORED)) ^ 0xffffffff
-    return int.from_bytes(reflected.to_bytes(4, 'little').translate(_MIRRORED), 'big')
+    reflected = zlib.crc32(swapped.translate(_REVERSED_BITS)) ^ 0xffffffff
+    return int.from_bytes(reflected.to_bytes(4, 'little').translate(_REVERSED_BITS), 'big')
 
 
 # The message ``LowCmd`` as bytes: made once, filled in place, encoded, sent.
 
 #: CDR's header: little-endian.
-HEADER = b'\x00\x01\x00\x00'
+CDR_HEADER = b'\x00\x01\x00\x00'
 
 
 @dataclass(frozen=True)
@@ -221,8 +221,8 @@ class LowCmd(JointCommand):
     def __init__(self, model: Model = MODELS['go2']) -> None:
         """Make a command that drives nothing."""
         self._layout = layout = LAYOUTS[model.package]
-        self._bytes = bytearray(HEADER + bytes(layout.size))
-        message = memoryview(self._bytes)[len(HEADER):]
+        self._bytes = bytearray(CDR_HEADER + bytes(layout.size))
+        message = memoryview(self._bytes)[len(CDR_HEADER):]
         self._message = message
         message[:len(layout.start)] = layout.start
         joints = len(model.joints)
@@ -289,8 +289,8 @@ _LITTLE_ENDIAN = 1
 BUTTONS = {name: 1 << k for k, name in enumerate((
     'R1', 'L1', 'start', 'select', 'R2', 'L2', 'F1', 'F2',
     'A', 'B', 'X', 'Y', 'up', 'right', 'down', 'left'))}
-#: MOST_LOST: packets that a motor may lose while the bridge drives it.
-MOST_LOST = 100
+#: MAX_LOST_PACKETS: packets that a motor may lose while the bridge drives it.
+MAX_LOST_PACKETS = 100
 
 
 def _record(size: int, **fields: tuple[Any, int]) -> np.dtype:
@@ -310,7 +310,7 @@ def _motor(size: int, **fields: tuple[Any, int]) -> np.dtype:
 
 
 #: Package -> structure of its LowState with CDR's header of 4 bytes.
-STATES = {
+STATE_LAYOUTS = {
     'unitree_go': _record(
         1180, quaternion=('4<f4', 28), gyroscope=('3<f4', 44), accelerometer=('3<f4', 56),
         imu_temperature=('i1', 80), first_mode=('u1', 81),
@@ -343,7 +343,7 @@ class LowState(RobotState):
 
     def __init__(self, model: Model = MODELS['go2']) -> None:
         """Start with everything at zero."""
-        self.model, fields = model, STATES[model.package]
+        self.model, fields = model, STATE_LAYOUTS[model.package]
         self._buffer = bytearray(fields.itemsize)
         self._all = np.ndarray((), fields, self._buffer)
         motors = self._all['motors'][:len(model.joints)]
@@ -396,7 +396,7 @@ class LowState(RobotState):
                     return f'the motor of {name} has stopped by itself: mode {now}'
         # Unsigned: a counter that began anew is a motor that did.
         lost = self.lost - self._lost_before
-        if lost.max() > MOST_LOST:
+        if lost.max() > MAX_LOST_PACKETS:
             return f'the motor of {joints[int(lost.argmax())]} receives no commands'
         # Bits that were set before anything was sent may tell of that.
         error = self.error & ~self._error_before
