@@ -239,9 +239,9 @@ class Generator(StartedNode):
 
     def _load(self) -> tuple[type[Network], Robot]:
         """Declare the parameters of every network; return network and robot."""
-        given = {name: override.value for name, override in self._parameter_overrides.items()}
+        overrides = {name: override.value for name, override in self._parameter_overrides.items()}
         self._parameter_overrides['network'] = Parameter('network', value=network_for(
-            given.get('network', NETWORK.default), given.get('robot')))
+            overrides.get('network', NETWORK.default), overrides.get('robot')))
         self._declare({'network': NETWORK})
         try:
             network = find_network(self._value('network'))

@@ -361,9 +361,9 @@ class CmdVel:
         if walking:
             speed, _, turn = self._target
             slowest, fastest = self._plan.speeds
-            if wanted := self._gait_for(speed):
-                self._requested = wanted
-                self._change(wanted)
+            if gait := self._gait_for(speed):
+                self._requested = gait
+                self._change(gait)
             elif not slowest <= speed <= fastest and not self._requested:
                 self._log.warning(f"cmd_vel asks for {speed:g} m/s: the {self._plan.name}'s "
                                   f'range is {slowest:g} to {fastest:g} m/s',
@@ -377,11 +377,11 @@ class CmdVel:
         """Return the gait to change to for a speed, m/s, or '' to stay; each is tried once."""
         if self._plan.name == self._faster:
             slower = self._slower
-            wanted = (slower.name if slower is not None and speed < HYSTERESIS * slower.speeds[1]
-                      else '')
+            gait = (slower.name if slower is not None and speed < HYSTERESIS * slower.speeds[1]
+                    else '')
         else:
-            wanted = self._faster if speed > self._plan.speeds[1] else ''
-        return '' if wanted == self._requested else wanted
+            gait = self._faster if speed > self._plan.speeds[1] else ''
+        return '' if gait == self._requested else gait
 
     def end(self) -> None:
         """Stop steering: the pattern ramps down for the last time."""

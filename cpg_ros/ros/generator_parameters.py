@@ -308,25 +308,25 @@ class Planner:
         precedence. An unknown gait adds nothing and is rejected later.
         """
         prefix = f'{self.network.name}.'
-        given = {p.name: p.value for p in parameters}
-        gait = given.get('gait')
-        values_wanted: dict[str, Any] = {}
+        changes = {p.name: p.value for p in parameters}
+        gait = changes.get('gait')
+        implied: dict[str, Any] = {}
         if isinstance(gait, str) and gait in self.presets:
             loaded = self.presets[gait].network.as_dict()
-            values_wanted = {prefix + key: value for key, value in loaded.items()}
-            values_wanted |= self._readouts(gait)
+            implied = {prefix + key: value for key, value in loaded.items()}
+            implied |= self._readouts(gait)
             if (frequency := self._frequency(gait)) is not None:
-                values_wanted['frequency'] = frequency
-            values_wanted['duty'] = 0.0
+                implied['frequency'] = frequency
+            implied['duty'] = 0.0
         for group, members in self.network.groups.items():
-            if isinstance(given.get(prefix + group), float):
-                values_wanted.update({prefix + key: given[prefix + group] for key in members})
-        values_wanted = {name: value for name, value in values_wanted.items() if name not in given}
-        values = {**current, **values_wanted, **given}
+            if isinstance(changes.get(prefix + group), float):
+                implied.update({prefix + key: changes[prefix + group] for key in members})
+        implied = {name: value for name, value in implied.items() if name not in changes}
+        values = {**current, **implied, **changes}
         for group, members in self.network.groups.items():
             parts = [values[prefix + key] for key in members]
-            if (any(prefix + key in values_wanted or prefix + key in given for key in members)
+            if (any(prefix + key in implied or prefix + key in changes for key in members)
                     and all(isinstance(part, float) for part in parts)):
                 parameters = [p for p in parameters if p.name != prefix + group]
-                values_wanted[prefix + group] = math.fsum(parts) / len(parts)
-        return [Parameter(name, value=value) for name, value in values_wanted.items()] + parameters
+                implied[prefix + group] = math.fsum(parts) / len(parts)
+        return [Parameter(name, value=value) for name, value in implied.items()] + parameters

@@ -238,9 +238,9 @@ class Inversion(StartedNode):
     async def _set(self, target: NodeClient, result: RecordingFit) -> bool:
         """Set a generator's parameters; return whether its robot can take the readouts."""
         robot = self._robot
-        theirs, = await target.values(['robot'])
+        robot_name, = await target.values(['robot'])
         # The fit's cells are then those of its joints.
-        whole = (robot is not None and theirs == self._value('robot')
+        whole = (robot is not None and robot_name == self._value('robot')
                  and robot.harmonics == result.fit.harmonics)
         await target.set_parameters(running_parameters(result, robot if whole else None),
                                     RESPONSE_TIMEOUT)

@@ -58,8 +58,8 @@ def declared(arguments: Arguments) -> list[LaunchDescriptionEntity]:
 
     def note(context: LaunchContext) -> None:
         # Once declared, an argument that equals its default looks the same, given or not.
-        given = context.launch_configurations
-        given[USER_ARGUMENTS] = ' '.join(name for name in declarations if name in given)
+        values = context.launch_configurations
+        values[USER_ARGUMENTS] = ' '.join(name for name in declarations if name in values)
 
     return [OpaqueFunction(function=note),
             *(DeclareLaunchArgument(name, default_value=default, description=text)
@@ -160,21 +160,21 @@ def started(context: LaunchContext, executable: str, name: str, arguments: Argum
     for former, now in RENAMED.items():
         if now in arguments and LaunchConfiguration(former, default='').perform(context):
             raise RuntimeError(f'there is no argument {former}: it is {now}')
-    given = {key: kind for key, (_, kind, _) in arguments.items()
+    types = {key: kind for key, (_, kind, _) in arguments.items()
              if LaunchConfiguration(key).perform(context)}
-    for key, kind in given.items():
+    for key, kind in types.items():
         value(context, key, kind)
     parameters = {key: ParameterValue(LaunchConfiguration(key), value_type=kind)
-                  for key, kind in given.items()}
+                  for key, kind in types.items()}
     layers: list[Any] = [{**parameters, **(fixed or {})}]
     if name_of_file := LaunchConfiguration('params_file').perform(context):
         file = Path(name_of_file).expanduser()
         if not file.is_file():
             raise RuntimeError(f'params_file:={name_of_file}: there is no such file')
         # Later values take precedence: defaults give way to the file.
-        given_names = LaunchConfiguration(USER_ARGUMENTS).perform(context).split()
-        asked = {key: parameter for key, parameter in parameters.items() if key in given_names}
-        layers = [parameters, str(file), {**asked, **(fixed or {})}]
+        names = LaunchConfiguration(USER_ARGUMENTS).perform(context).split()
+        overrides = {key: parameter for key, parameter in parameters.items() if key in names}
+        layers = [parameters, str(file), {**overrides, **(fixed or {})}]
     return Node(package='cpg_ros', executable=executable, name=name, output='screen',
                 namespace=LaunchConfiguration('namespace'),
                 parameters=layers, **options)

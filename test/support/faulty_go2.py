@@ -76,7 +76,7 @@ class FaultyGo2:
         self.wires = dict(Wire.wires)
         self.loop = FeedbackLoop(self.pattern, geometry, inputs,
                                  lambda: (self.gait.own_speed, 0.0, 0.0))
-        self.loop.wanted = True
+        self.loop.enabled = True
         self._ticks = CTicks(self.pattern, self.loop, DT)
         # Faults begin at another phase of the stride with each seed.
         self.sensors = FaultySensors(fault, seed, begins + 0.1 * seed)

@@ -70,7 +70,7 @@ class HumanoidUnderFault:
         finally:
             sensor_input.PolledSubscription = subscription
         self.loop = BalanceLoop(self.pattern, inputs, lambda: (speed, 0.0, 0.0))
-        self.loop.wanted = True
+        self.loop.enabled = True
         self._ticks = CTicks(self.pattern, self.loop, DT)
         # As many as the robot has, with the names of what it holds.
         self._names = (*robot.order, *robot.held)

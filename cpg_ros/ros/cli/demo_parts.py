@@ -354,10 +354,10 @@ def _again(file: Path, source: Path, option: str, args: Namespace) -> None:
     if getattr(args, option) is not None:
         raise InputError(f'argument --{option}: {file} is there already; delete it, or give '
                          'another folder with --out')
-    made = file.stat().st_mtime
-    later = f', though {source} has changed since' if source.stat().st_mtime > made else ''
-    say(f'{file} of {datetime.fromtimestamp(made):%Y-%m-%d %H:%M} is used again{later}; delete it '
-        'to make it anew')
+    mtime = file.stat().st_mtime
+    later = f', though {source} has changed since' if source.stat().st_mtime > mtime else ''
+    say(f'{file} of {datetime.fromtimestamp(mtime):%Y-%m-%d %H:%M} is used again{later}; delete '
+        'it to make it anew')
 
 
 def _tune(args: Namespace, steps: Steps, files: tuple[Path, Path], gaits: Sequence[str]) -> None:

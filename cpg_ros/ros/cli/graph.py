@@ -203,13 +203,13 @@ def topics(node: Node) -> dict[str, str]:
     They are found one after another, slowly on a loaded machine: it waits until none has come for
     ``DISCOVERY_TIME``.
     """
-    found: list[tuple[str, list[str]]] = []
+    names: list[tuple[str, list[str]]] = []
     changed = time.monotonic()
     while (now := time.monotonic()) < changed + DISCOVERY_TIME:
-        if (new := node.get_topic_names_and_types()) != found:
-            found, changed = new, now
+        if (new := node.get_topic_names_and_types()) != names:
+            names, changed = new, now
         time.sleep(0.02)
-    return {name: ' '.join(kinds) for name, kinds in sorted(found)}
+    return {name: ' '.join(kinds) for name, kinds in sorted(names)}
 
 
 class Topic:
@@ -235,8 +235,8 @@ class Topic:
                 raise SilentTopic(f'nobody publishes on {topic}')
             self._pause()
         # What was published before is kept for those that ask as its publisher offers it.
-        kept = {publisher.qos_profile.durability for publisher in publishers}
-        quality = latched if kept == {DurabilityPolicy.TRANSIENT_LOCAL} else best_effort
+        durabilities = {publisher.qos_profile.durability for publisher in publishers}
+        quality = latched if durabilities == {DurabilityPolicy.TRANSIENT_LOCAL} else best_effort
         self._subscription = PolledSubscription(
             node, message_class(publishers[0].topic_type), name, quality(QUEUE_DEPTH),
             overridable=False)

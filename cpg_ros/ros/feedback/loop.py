@@ -56,7 +56,7 @@ class SensorLoop:
     Attributes:
         inputs: the robot's sensors.
         feedback: its laws, whose gains may be replaced.
-        wanted: whether the feedback is enabled.
+        enabled: whether the feedback is.
         faults: reasons that interrupt it, such as 'imu: no messages for 3.2 s'; else ''.
         waiting: whether an input has never arrived.
         fraction: of all corrections, 0 to 1.
@@ -65,7 +65,7 @@ class SensorLoop:
 
     feedback: Any
     _correction: native.Correction
-    wanted: Any
+    enabled: Any
     faults: Any
     waiting: Any
     fraction: Any
@@ -167,13 +167,13 @@ class FeedbackLoop(SensorLoop):
         self.set_gains(self.feedback.gains)
 
     @property
-    def wanted(self) -> bool:
+    def enabled(self) -> bool:
         """Whether the feedback is enabled."""
         return self._state[REQUESTED] > 0.0
 
-    @wanted.setter
-    def wanted(self, wanted: bool) -> None:
-        self._state[REQUESTED] = wanted
+    @enabled.setter
+    def enabled(self, enabled: bool) -> None:
+        self._state[REQUESTED] = enabled
 
     @property
     def fraction(self) -> float:
@@ -199,9 +199,9 @@ class FeedbackLoop(SensorLoop):
 
     def restart(self) -> None:
         """Start again, as where simulated time jumps back."""
-        wanted = self.wanted
+        enabled = self.enabled
         self._state[:] = 0.0
-        self._state[[REQUESTED, OFF_TIME]] = wanted, math.inf
+        self._state[[REQUESTED, OFF_TIME]] = enabled, math.inf
         self.feedback.reset()
         self.inputs.restart()
         self._data.rates[0][:] = 0.0
@@ -286,13 +286,13 @@ class BalanceLoop(SensorLoop):
                                           arguments=ctypes.addressof(self._memory))
 
     @property
-    def wanted(self) -> bool:
+    def enabled(self) -> bool:
         """Whether the feedback is enabled."""
         return self._pattern.balance is not None
 
-    @wanted.setter
-    def wanted(self, wanted: bool) -> None:
-        self._pattern.balance = self.feedback if wanted else None
+    @enabled.setter
+    def enabled(self, enabled: bool) -> None:
+        self._pattern.balance = self.feedback if enabled else None
 
     @property
     def waiting(self) -> bool:
@@ -311,7 +311,7 @@ class BalanceLoop(SensorLoop):
     @property
     def fraction(self) -> float:
         """Fraction of the robot's balance by the feedback: 0 or 1."""
-        return 1.0 if self.wanted and self._pattern.balancing else 0.0
+        return 1.0 if self.enabled and self._pattern.balancing else 0.0
 
     def restart(self) -> None:
         """Start again, as where simulated time jumps back."""

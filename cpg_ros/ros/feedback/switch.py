@@ -245,7 +245,7 @@ class FeedbackSwitch:
         if self.loop is not None:
             self.loop.set_gains(Gains(*map(self._value, Gains._fields)) if self._biped is None else
                                 BipedGains(**{name: self._value(name) for name in BIPED_GAIN_OF}))
-            self.loop.wanted = enabled and not self._hindrance
+            self.loop.enabled = enabled and not self._hindrance
 
     def hinder(self, reason: str) -> None:
         """Fade the feedback out as long as there is a reason, '' for none; a biped would fall."""
@@ -346,14 +346,14 @@ class FeedbackSwitch:
     def out(self) -> str:
         """Reason why active feedback is interrupted, or ''."""
         loop = self.loop
-        return loop.faults if loop is not None and loop.wanted and not loop.waiting else ''
+        return loop.faults if loop is not None and loop.enabled and not loop.waiting else ''
 
     def state(self, now: float) -> dict[str, str]:
         """Return its state and the ages of its inputs, for /diagnostics; now in s."""
         loop = self.loop
         if loop is None:
             return {'feedback': 'off'}
-        return {'feedback': loop.state if loop.wanted else 'off',
+        return {'feedback': loop.state if loop.enabled else 'off',
                 **{f'age of {name} [ms]': f'{1e3 * age:.1f}'
                    for name, age in loop.inputs.ages(now).items()},
                 **{f'delay of {name} [ms]': f'{1e3 * delay:.1f}'

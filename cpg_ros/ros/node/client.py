@@ -96,8 +96,9 @@ def discover(node: Node) -> Graph:
         # The panel's own clients keep the name of a service on the graph.
         return (name, kind) in names and ('/srv/' not in kind or node.count_services(name) > 0)
 
-    return Graph(*map(with_names, (GENERATOR_INTERFACES, SIMULATION_INTERFACES,
-                                   INVERSION_INTERFACES, BRIDGE_INTERFACES)), frozenset(topics))
+    return Graph(with_names(GENERATOR_INTERFACES), with_names(SIMULATION_INTERFACES),
+                 with_names(INVERSION_INTERFACES), with_names(BRIDGE_INTERFACES),
+                 frozenset(topics))
 
 
 #: TIMEOUT: longest time to find a service, and again for it to answer, s.

@@ -105,8 +105,8 @@ class PolledSubscription:
         """Take the messages that have arrived, each with its time of arrival, ns (system time)."""
         handle = self._subscription.handle
         with handle:
-            while (taken := handle.take_message(self._kind, self._raw)) is not None:
-                yield taken[0], taken[1]['received_timestamp']
+            while (sample := handle.take_message(self._kind, self._raw)) is not None:
+                yield sample[0], sample[1]['received_timestamp']
 
     def newest(self) -> Any:
         """Return the newest message since the last call, or None."""
@@ -114,9 +114,9 @@ class PolledSubscription:
         with handle:
             # No more than these can wait.
             for _ in range(self.depth):
-                if (taken := handle.take_message(self._kind, self._raw)) is None:
+                if (sample := handle.take_message(self._kind, self._raw)) is None:
                     break
-                newest = taken[0]
+                newest = sample[0]
         return newest
 
     @property

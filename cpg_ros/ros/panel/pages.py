@@ -211,8 +211,8 @@ class Pages:
 
     def admit(self, connection: ServerConnection) -> Page:
         """Add the page of a connection, and return it."""
-        taken = {page.number for page in self.everyone}
-        number = next(k for k in range(1, len(taken) + 2) if k not in taken)
+        numbers = {page.number for page in self.everyone}
+        number = next(k for k in range(1, len(numbers) + 2) if k not in numbers)
         self.everyone.append(Page(connection, number, stop_only=len(self.everyone) >= MAX_PAGES))
         return self.everyone[-1]
 

@@ -378,13 +378,13 @@ class Panel(StartedNode):
         self._loop = asyncio.get_running_loop()
         server = await self._server.start(self._socket)
         host, port = self._value('host'), self._port
-        shown = socket.gethostname() if host in ('0.0.0.0', '::') else host
-        shown = f'[{shown}]' if ':' in shown else shown
-        self.get_logger().info(f'watch and drive it in a browser: http://{shown}:{port}/'
+        address = socket.gethostname() if host in ('0.0.0.0', '::') else host
+        address = f'[{address}]' if ':' in address else address
+        self.get_logger().info(f'watch and drive it in a browser: http://{address}:{port}/'
                                + ' with ?token=WORD' * bool(self._token))
         if self._token and aside().isatty():
             # The log is kept in files.
-            print(f'http://{shown}:{port}/?token={self._token}', file=aside())
+            print(f'http://{address}:{port}/?token={self._token}', file=aside())
         if not is_loopback(host):
             self.get_logger().warning('anyone on this network who has the token can '
                                       'open the page, and nothing is encrypted')

@@ -272,10 +272,10 @@ def _draw(mujoco: Any, model: Any, body: int, link: Link) -> None:
     first, joints = model.body_geomadr[body], model.body_jntnum[body]
     origin = model.jnt_pos[model.body_jntadr[body] + joints - 1] if joints else np.zeros(3)
     geoms = range(first, first + model.body_geomnum[body])
-    seen = [k for k in geoms if model.geom_group[k] < COLLISION_GROUP
-            and not (model.geom_contype[k] and model.geom_type[k] != mujoco.mjtGeom.mjGEOM_MESH
-                     and any(model.geom_type[j] == mujoco.mjtGeom.mjGEOM_MESH for j in geoms))]
-    for k in seen or geoms:
+    visual = [k for k in geoms if model.geom_group[k] < COLLISION_GROUP
+              and not (model.geom_contype[k] and model.geom_type[k] != mujoco.mjtGeom.mjGEOM_MESH
+                       and any(model.geom_type[j] == mujoco.mjtGeom.mjGEOM_MESH for j in geoms))]
+    for k in visual or geoms:
         material = model.geom_matid[k]
         colour = model.mat_rgba[material] if material >= 0 else model.geom_rgba[k]
         kind = mujoco.mjtGeom(model.geom_type[k]).name.removeprefix('mjGEOM_').lower()

@@ -89,10 +89,10 @@ def rejected(token: str, path: str, host: str, origin: str) -> str:
     if origin and urlsplit(origin).netloc != host:
         return 'the request comes from a page of another site'
     if token:
-        given = parse_qs(urlsplit(path).query).get('token', [''])[0]
-        if not given:
+        presented = parse_qs(urlsplit(path).query).get('token', [''])[0]
+        if not presented:
             return 'the token is missing'
-        if not hmac.compare_digest(given.encode(errors='replace'), token.encode()):
+        if not hmac.compare_digest(presented.encode(errors='replace'), token.encode()):
             return 'the token is wrong'
     # A name that its owner lets point at this machine (DNS rebinding) is another site's, too.
     elif not is_loopback(urlsplit(f'//{host}').hostname or ''):

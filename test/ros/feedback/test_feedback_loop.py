@@ -101,7 +101,7 @@ class Robot:
         inputs = SensorInput(None, GO2, geometry, 'imu', 'measured', contacts, 'foot_contacts')
         self.loop = FeedbackLoop(self.pattern, geometry, inputs,
                                  lambda: (made.own_speed, 0.0, 0.0))
-        self.loop.wanted = True
+        self.loop.enabled = True
         self.ticks = CTicks(self.pattern, self.loop, DT)
         self.late, self.lag = {topic: [] for topic in Wire.wires}, lag
         self.frozen = {}
@@ -244,7 +244,7 @@ def test_the_closed_loop_survives_the_push_that_fells_the_open_one(monkeypatch):
     for wanted in (True, False):
         robot = Robot(monkeypatch, gyroscope_noise=0.02, accelerometer_noise=0.2,
                       orientation_bias=0.008)
-        robot.loop.wanted = wanted
+        robot.loop.enabled = wanted
         for k in range(round(4.5 / DT)):
             if k == round(2.5 / DT):
                 robot.body.push(np.array([0.0, 240.0, 0.0]), 0.1)
@@ -274,7 +274,7 @@ def test_targets_go_too_far_after_a_push_where_measurements_are_young(monkeypatc
 
 def test_switched_off_from_the_start_nothing_changes_bit_for_bit(monkeypatch):
     robot, alone = Robot(monkeypatch), Pattern(program('trot'), 0.4)
-    robot.loop.wanted = False
+    robot.loop.enabled = False
     for _ in range(1000):
         robot.tick()
         alone.advance(DT)
