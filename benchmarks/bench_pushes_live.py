@@ -28,7 +28,7 @@ from bench_feedback import MODEL, ROBOT
 from common import emit, log
 from cpg_ros.feedback.gains import robot_gains
 from cpg_ros.motion.robot_file import read_robot
-from cpg_ros.simulation.scenario import PUSH
+from cpg_ros.simulation.scenario import PUSH_DURATION
 from feedback_figures import interval, pushes, subject
 import numpy as np
 from processes import enter_workspace
@@ -52,8 +52,9 @@ def over_the_graph(size: float, count: int, seed: int) -> float:
             angle = 2.0 * math.pi * (k % 12 + rng.uniform()) / 12
             stage.drive(SPEED)
             stage.spend(ON + rng.uniform(0.0, 0.5))
-            stage.push(size / PUSH * math.cos(angle), size / PUSH * math.sin(angle))
-            stage.spend(PUSH + AFTER)
+            force = size / PUSH_DURATION
+            stage.push(force * math.cos(angle), force * math.sin(angle))
+            stage.spend(PUSH_DURATION + AFTER)
             survived += stage.upright
             if not stage.upright:
                 stage.stand_up()

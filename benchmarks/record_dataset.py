@@ -35,7 +35,7 @@ from cpg_ros.motion.robot_file import load_robot
 from cpg_ros.motion.rotations import fill_quaternion
 from cpg_ros.networks.registry import PRESETS
 from cpg_ros.simulation.closed_loop import ClosedLoopBatch
-from cpg_ros.simulation.scenario import impulse, PUSH, Scenario, SensorNoise
+from cpg_ros.simulation.scenario import impulse, PUSH_DURATION, Scenario, SensorNoise
 from cpg_ros.simulation.terrain import Terrain
 import numpy as np
 import yaml
@@ -153,7 +153,7 @@ def _truth(plan: GaitPlan, scenario: Scenario, fell: float, stands: np.ndarray
             'wish': None if plan.motion.steering is None else round(scenario.speed, 4),
             'friction': round(scenario.friction, 3),
             'ground': None if scenario.terrain is None else asdict(scenario.terrain),
-            'pushes': [[when, *(round(PUSH * one, 3) for one in force)]
+            'pushes': [[when, *(round(PUSH_DURATION * one, 3) for one in force)]
                        for when, *force in scenario.pushes],
             'fell': None if math.isinf(fell) else fell,
             'duty': dict(zip(robot.legs, np.round(stands.mean(axis=0), 3).tolist(), strict=True))}

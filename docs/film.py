@@ -150,7 +150,7 @@ def main() -> None:
     parser.add_argument('--caption', default='Your robot, from its URDF')
     parser.add_argument('--biped', default='unitree_g1' if find_spec('mjlab') else 'humanoid')
     args = parser.parse_args()
-    recorder.SHADOW, recorder.SAMPLES = 2048, 2
+    recorder.SHADOW_SIZE, recorder.NUM_SAMPLES = 2048, 2
     out = OUT if args.urdf else RUN
     first, *others = pictures(args) if args.urdf else (one.resize(SMALL) for one in run())
     first.save(out, save_all=True, append_images=others, duration=round(1000 / RATE), loop=0,

@@ -29,8 +29,8 @@ from typing import Any
 from cpg_ros.feedback.kinematics import GRAVITY
 from cpg_ros.motion.robot_file import load_robot
 from cpg_ros.simulation.bodies import BatchPhysics
-from cpg_ros.simulation.body import Body, FALLEN
-from cpg_ros.simulation.run_metrics import BEGINNING, torques
+from cpg_ros.simulation.body import Body, MAX_LEAN
+from cpg_ros.simulation.run_metrics import SETTLING_TIME, torques
 from cpg_ros.simulation.scenario import Scenario, SensorNoise
 from cpg_ros.simulation.terrain import add_ground
 import numpy as np
@@ -242,7 +242,7 @@ class _Record:
         self._place[going, now], self._rates[going, now] = pose[:, :, :2], twist[:, :, 3:]
         self._velocity[going, now] = np.einsum('nkji,nkj->nki', turn, twist[:, :, :3])
         self._power[going, now, 0] = power
-        down = (turn[:, :, 2, 2] < math.cos(FALLEN)) | trunk
+        down = (turn[:, :, 2, 2] < math.cos(MAX_LEAN)) | trunk
         far = pose[:, :, 0] > goal
         ends = (down | far).any(axis=1)
         for run, fallen, first in zip(going[ends], down[ends], (down | far)[ends].argmax(axis=1),
@@ -256,7 +256,7 @@ class _Record:
         for run, end in enumerate(self._end):
             for rows in (self._place, self._velocity, self._rates, self._power):
                 rows[run, end:] = rows[run, end - 1]
-        late = slice(min(round(BEGINNING / TIMESTEP), self._steps // 2), None)
+        late = slice(min(round(SETTLING_TIME / TIMESTEP), self._steps // 2), None)
         way = np.abs(self._velocity[:, late, 0].sum(axis=1)) * TIMESTEP
         work = self._power[:, late, 0].sum(axis=1) * TIMESTEP
         return Runs(self._fell, self._arrived, self._place, self._velocity, self._rates,

@@ -26,16 +26,16 @@ from cpg_ros.motion.pattern import GaitRunner
 from cpg_ros.motion.robot import Robot
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.run_metrics import cost_of_transport, motor_power
-from cpg_ros.simulation.scenario import PUSH, SensorNoise
+from cpg_ros.simulation.scenario import PUSH_DURATION, SensorNoise
 from cpg_ros.simulation.sensors import fill_sensor_data, NoisySenses
 from cpg_ros.simulation.terrain import add_ground, lay, set_friction, Terrain
 import numpy as np
 
-#: LOW: height of the centre of mass, as a fraction of the commanded one, below which the robot has
-#: fallen.
-LOW = 0.6
-#: SETTLING: time after the first step from which on a run is measured, s.
-SETTLING = 3.0
+#: MIN_HEIGHT: height of the centre of mass, as a fraction of the commanded one, below which the
+#: robot has fallen.
+MIN_HEIGHT = 0.6
+#: SETTLING_TIME: time after the first step from which on a run is measured, s.
+SETTLING_TIME = 3.0
 
 
 @dataclass(eq=False, repr=False)
@@ -44,10 +44,10 @@ class BipedOutcome(ShortRepr):
 
     Attributes:
         fell: when it fell, s, infinite if it did not.
-        speed: mean velocity forward and left, heading's axes, m/s, after SETTLING.
+        speed: mean velocity forward and left, heading's axes, m/s, after SETTLING_TIME.
         tilt: largest angle of the base to the vertical, rad.
         steps: touchdowns by the clock.
-        flight: fraction of the time after SETTLING in which no foot touches the ground.
+        flight: fraction of the time after SETTLING_TIME in which no foot touches the ground.
         cost: of transport: mechanical work of the motors, those of the arms too and none
             regained, per weight and metre.
         path: time, place of the base (x y z) and its yaw, every 10 ms, shape (n, 5).
@@ -151,7 +151,7 @@ class BipedRun:
             while changes and changes[0][0] <= time:
                 feedback.set_gait(changes.pop(0)[1])
             while forces and forces[0][0] <= time:
-                body.push(np.array([*forces.pop(0)[1:], 0.0]), PUSH)
+                body.push(np.array([*forces.pop(0)[1:], 0.0]), PUSH_DURATION)
             true = self.measure(before)
             before[0] = body.rates
             self._command(feedback.advance(senses(true), dt))
@@ -164,7 +164,7 @@ class BipedRun:
             _, held_speeds, held_torques = body.held
             work += dt * float(motor_power(body.torque, body.velocity)
                                + motor_power(held_torques, held_speeds))
-            if time > began + SETTLING:
+            if time > began + SETTLING_TIME:
                 c, s = math.cos(feedback.memory.heading), math.sin(feedback.memory.heading)
                 x, y = body.rates[:2]
                 moved += c * x + s * y, c * y - s * x
@@ -174,7 +174,7 @@ class BipedRun:
                 path.append((time, *body.base, body.yaw))
                 poses.append(body.data.qpos.copy())
             height = feedback.memory.center[0, 2] - feedback.pose.soles[:, 2].min()
-            if body.fallen or height < LOW * feedback.gains.height:
+            if body.fallen or height < MIN_HEIGHT * feedback.gains.height:
                 outcome.fell = time
                 break
         outcome.path, outcome.poses = np.array(path), np.array(poses)

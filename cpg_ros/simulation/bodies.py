@@ -109,8 +109,8 @@ class BatchPhysics:
 
 # Many runs at once, open loop: what a plan publishes, and bodies that follow it on all cores.
 
-#: TOGETHER: number of runs whose states are in memory at the same time.
-TOGETHER = 12
+#: BATCH_SIZE: number of runs whose states are in memory at the same time.
+BATCH_SIZE = 12
 
 
 def targets(plan: GaitPlan, duration: float, timestep: float,
@@ -165,8 +165,8 @@ class OpenLoopBatch(BatchPhysics):
 
         """
         outcomes = []
-        for first in range(0, len(runs), TOGETHER):
-            part = runs[first:first + TOGETHER]
+        for first in range(0, len(runs), BATCH_SIZE):
+            part = runs[first:first + BATCH_SIZE]
             control, joints, force = self.controls(len(part), len(part[0][0]))
             for k, (angles, scenario) in enumerate(part):
                 joints[k], force[k] = angles, scenario.forces(len(angles), self.timestep)

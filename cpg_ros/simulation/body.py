@@ -24,11 +24,11 @@ from cpg_ros.motion.strides import smoothstep
 from cpg_ros.simulation.robot_model import engine, load, SimulationError
 import numpy as np
 
-#: FALLEN: lean of the base above which the robot has fallen, rad.
-FALLEN = math.radians(60.0)
-#: LEVEL: largest lean of the base of a robot that sits on the floor, rad; FOLDED: height of the
-#: base over the feet by the joints' targets, as a fraction of the stand's, below which it sits.
-LEVEL, FOLDED = 0.35, 0.6
+#: MAX_LEAN: lean of the base above which the robot has fallen, rad.
+MAX_LEAN = math.radians(60.0)
+#: A robot sits on the floor. MAX_SEATED_LEAN: of its base, rad; MAX_SEATED_HEIGHT: of the base
+#: over the feet by the joints' targets, as a fraction of the stand's.
+MAX_SEATED_LEAN, MAX_SEATED_HEIGHT = 0.35, 0.6
 
 
 def add_payload(model: Any, base: int, mass: float) -> None:
@@ -252,20 +252,20 @@ class Body:
 
     @property
     def fallen(self) -> bool:
-        """Whether the base leans more than FALLEN or lies on the floor."""
-        return self._upright < math.cos(FALLEN) or self._trunk[0] > 0.0
+        """Whether the base leans more than MAX_LEAN or lies on the floor."""
+        return self._upright < math.cos(MAX_LEAN) or self._trunk[0] > 0.0
 
     @property
     def sits(self) -> bool:
         """Whether the base lies level on the floor, and the legs are to be folded."""
-        if self._trunk[0] <= 0.0 or self._upright < math.cos(LEVEL):
+        if self._trunk[0] <= 0.0 or self._upright < math.cos(MAX_SEATED_LEAN):
             return False
         assert self._height is not None
         mujoco, posed = engine(), self._posed
         posed.qpos[self._at] = 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0
         posed.qpos[self._angles] = self._control - self._added
         mujoco.mj_kinematics(self.model, posed)
-        return -self._clearance(posed) < FOLDED * self._height
+        return -self._clearance(posed) < MAX_SEATED_HEIGHT * self._height
 
     @property
     def _upright(self) -> float:
@@ -342,8 +342,8 @@ def _ancestors(model: object, body: int) -> list[int]:
 
 # Soft start: the path to commanded angles that are far from the joints, or already moving.
 
-#: NEAR: distance up to which commanded angles are followed at once, rad.
-NEAR = 0.05
+#: FOLLOWED_DISTANCE: distance up to which commanded angles are followed at once, rad.
+FOLLOWED_DISTANCE = 0.05
 
 
 class Approach:
@@ -375,7 +375,7 @@ class Approach:
         way, done, steps = commanded - self._start, self._done, self._steps
         far = np.zeros(len(done))
         np.maximum.at(far, self._legs, np.abs(way))
-        done[(done == 0) & (far > 0.0) & (far <= NEAR)] = steps
+        done[(done == 0) & (far > 0.0) & (far <= FOLLOWED_DISTANCE)] = steps
         done[((done > 0) | (far > 0.0)) & (done < steps)] += 1
         self._there = bool((done == steps).all())
         fraction = smoothstep(done / steps)

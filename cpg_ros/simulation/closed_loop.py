@@ -32,9 +32,9 @@ from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.motion.strides import StrideCommand
 from cpg_ros.simulation.bodies import BatchPhysics, KP_DIGITS
-from cpg_ros.simulation.body import Body, FALLEN
+from cpg_ros.simulation.body import Body, MAX_LEAN
 from cpg_ros.simulation.robot_setup.model_reading import geometry_from, load_description
-from cpg_ros.simulation.run_metrics import BEGINNING, cost_of_transport, motor_power, torques
+from cpg_ros.simulation.run_metrics import cost_of_transport, motor_power, SETTLING_TIME, torques
 from cpg_ros.simulation.scenario import Outcome, Scenario, SensorNoise
 from cpg_ros.simulation.sensors import fill_sensor_data, NoisySenses
 from cpg_ros.simulation.terrain import add_ground
@@ -207,7 +207,7 @@ class _Bodies:
 
         """
         level = np.cos(rpy[:, 0]) * np.cos(rpy[:, 1])
-        down = (level < math.cos(FALLEN)) | (self._sensors[:, 3 * self._legs] > 0.0)
+        down = (level < math.cos(MAX_LEAN)) | (self._sensors[:, 3 * self._legs] > 0.0)
         far = self._state[:, 1 + self._physics.parts.pose[0]] > goal
         ends = (down | far)[self._going]
         if ends.any():
@@ -376,7 +376,7 @@ class ClosedLoopBatch(BatchPhysics):
                 break
         for rows in (*record.values(), work):
             rows[k + 1:] = rows[k]
-        late = slice(min(round(BEGINNING / dt), steps // 2), None)
+        late = slice(min(round(SETTLING_TIME / dt), steps // 2), None)
         cost = cost_of_transport(work[late].sum(axis=0) * dt, self.geometry.weight,
                                  record['velocity'][late, :, 0].sum(axis=0) * dt)
         return Outcome(fell=bodies.fell, arrived=bodies.arrived, cost=cost,

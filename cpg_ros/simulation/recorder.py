@@ -37,10 +37,10 @@ from PIL import Image
 
 # Recording of a run for its film, its footfall diagram and its summary.
 
-#: KEPT: last part of a run that is kept, s; longer films and diagrams are of no use.
-KEPT = 60.0
-#: FRAMES: pictures of a film per second; SAMPLE_RATE: samples of the footfalls per second.
-FRAMES, SAMPLE_RATE = 12.5, 200.0
+#: MAX_DURATION: last part of a run that is kept, s; longer films and diagrams are of no use.
+MAX_DURATION = 60.0
+#: FRAME_RATE: pictures of a film per second; SAMPLE_RATE: samples of the footfalls per second.
+FRAME_RATE, SAMPLE_RATE = 12.5, 200.0
 
 
 class RunLog:
@@ -63,10 +63,10 @@ class RunLog:
         """
         self._body, self._film, self._footfalls = body, film, footfalls
         self._terrain = terrain
-        self._fps = min(FRAMES, rate)
+        self._fps = min(FRAME_RATE, rate)
         self._frame_due = self._sample_due = 0.0
-        self._poses: deque[np.ndarray] = deque(maxlen=round(KEPT * FRAMES))
-        self._steps: deque[tuple] = deque(maxlen=round(KEPT * SAMPLE_RATE))
+        self._poses: deque[np.ndarray] = deque(maxlen=round(MAX_DURATION * FRAME_RATE))
+        self._steps: deque[tuple] = deque(maxlen=round(MAX_DURATION * SAMPLE_RATE))
         self._gaits: list[tuple[float, str]] = []
         self._now = 0.0
         if footfalls is not None:
@@ -88,7 +88,7 @@ class RunLog:
         """Record the body at a time, s, that grows from call to call."""
         self._now, body = now, self._body
         if self._film is not None and now >= self._frame_due:
-            self._frame_due += 1.0 / FRAMES
+            self._frame_due += 1.0 / FRAME_RATE
             self._poses.append(body.data.qpos.copy())
         if self._footfalls is not None and now >= self._sample_due:
             self._sample_due += 1.0 / SAMPLE_RATE
@@ -134,18 +134,18 @@ def summary(body: Body, since: float) -> str:
             f'{"fallen" if body.fallen else "upright"}')
 
 
-#: COLOURS: number of colours of a GIF; few, and no dithering, make it small.
-COLOURS = 96
+#: NUM_COLOURS: number of colours of a GIF; few, and no dithering, make it small.
+NUM_COLOURS = 96
 #: AZIMUTH, ELEVATION: direction of view, degrees: from the robot's left, ahead of it and above.
 AZIMUTH, ELEVATION = -125.0, -14.0
-#: DISTANCE: of the camera, as a multiple of the base's height in the stand.
-DISTANCE = 4.7
-#: FOLLOW: fraction of the robot's yaw by which the camera follows from picture to picture.
-FOLLOW = 0.1
+#: CAMERA_DISTANCE: of the camera, as a multiple of the base's height in the stand.
+CAMERA_DISTANCE = 4.7
+#: YAW_GAIN: fraction of the robot's yaw by which the camera follows from picture to picture.
+YAW_GAIN = 0.1
 NO_OPENGL = ('pictures need OpenGL without a screen; on Debian and Ubuntu: apt install libegl1 '
              'libgl1-mesa-dri, or libosmesa6')
-#: SHADOW: resolution of shadows; SAMPLES: samples per pixel (0: edges are not smoothed).
-SHADOW, SAMPLES = 1024, 0
+#: SHADOW_SIZE: resolution of shadows; NUM_SAMPLES: samples per pixel (0: edges are not smoothed).
+SHADOW_SIZE, NUM_SAMPLES = 1024, 0
 
 
 class Camera:
@@ -166,7 +166,7 @@ class Camera:
         model.vis.global_.offwidth, model.vis.global_.offheight = width, height
         model.vis.headlight.ambient[:], model.vis.headlight.diffuse[:] = 0.4, 0.4
         # Without a graphics card these two cost as much as all the rest.
-        model.vis.quality.shadowsize, model.vis.quality.offsamples = SHADOW, SAMPLES
+        model.vis.quality.shadowsize, model.vis.quality.offsamples = SHADOW_SIZE, NUM_SAMPLES
         free = int(np.argmax(model.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE)))
         self._base = slice(model.jnt_qposadr[free], model.jnt_qposadr[free] + 7)
         self._option, self._view = mujoco.MjvOption(), mujoco.MjvCamera()
@@ -201,10 +201,10 @@ class Camera:
         gap = AZIMUTH + math.degrees(rpy_of(np.array(turned))[2]) - view.azimuth
         gap -= 360.0 * round(gap / 360.0)
         if not view.distance:
-            view.distance = DISTANCE * z
+            view.distance = CAMERA_DISTANCE * z
             view.lookat[2] = 0.6 * z
             view.azimuth += gap
-        view.azimuth += FOLLOW * gap
+        view.azimuth += YAW_GAIN * gap
         view.lookat[:2] = x, y
         mujoco.mjv_updateScene(self._model, self._data, self._option, None, view,
                                mujoco.mjtCatBit.mjCAT_ALL, self._scene)
@@ -295,7 +295,7 @@ def write_film(path: Path, pictures: Iterator[np.ndarray], count: int, fps: floa
 def _write_gif(path: Path, pictures: Iterator[np.ndarray], count: int, fps: float) -> None:
     """Write a GIF with the colours of its first picture."""
     images = (Image.fromarray(np.ascontiguousarray(picture)) for picture in pictures)
-    first = next(images).quantize(COLOURS, dither=Image.Dither.NONE)
+    first = next(images).quantize(NUM_COLOURS, dither=Image.Dither.NONE)
     # A GIF counts in hundredths of a second: what rounding leaves over is made up for.
     ends = np.round(100.0 / fps * np.arange(count + 1)).astype(int)
     first.save(path, 'GIF', save_all=True, loop=0, duration=(10 * np.diff(ends)).tolist(),

@@ -38,13 +38,13 @@ import numpy as np
 
 # Default gains of joints: those of a Unitree Go2, scaled to the mass of the robot.
 
-#: The Unitree Go2. KP: stiffness of its joints, N m/rad; KD: damping, N m s/rad; BORNE: mass per
-#: leg, kg; SPEED: largest speed of the joints in its trot, rad/s.
-KP, KD, BORNE, SPEED = 60.0, 2.0, 15.206 / 4.0, 12.0
-#: SERVO: limit up to which joints are taken for hobby servos, rad/s.
-SERVO = 10.0
-#: STEADY: least inertia of a motor, as a multiple of kp timestep^2, with which control is stable.
-STEADY = 2.0
+#: The Unitree Go2. KP: stiffness of its joints, N m/rad; KD: damping, N m s/rad; LEG_MASS: mass
+#: per leg, kg; SPEED: largest speed of the joints in its trot, rad/s.
+KP, KD, LEG_MASS, SPEED = 60.0, 2.0, 15.206 / 4.0, 12.0
+#: MAX_SERVO_SPEED: limit up to which joints are taken for hobby servos, rad/s.
+MAX_SERVO_SPEED = 10.0
+#: Least inertia of a motor, as a multiple of kp timestep^2, with which control is stable.
+MIN_INERTIA = 2.0
 
 
 def usual_gains(mass: float, legs: int, speed: float = math.inf) -> tuple[float, float]:
@@ -59,8 +59,8 @@ def usual_gains(mass: float, legs: int, speed: float = math.inf) -> tuple[float,
         speed: limit of the joints, rad/s.
 
     """
-    larger = mass / legs / BORNE
-    geared = max(1.0, SPEED / larger**(1.0 / 6.0) / speed) if speed <= SERVO else 1.0
+    larger = mass / legs / LEG_MASS
+    geared = max(1.0, SPEED / larger**(1.0 / 6.0) / speed) if speed <= MAX_SERVO_SPEED else 1.0
     return (float(f'{geared * KP * larger**(4.0 / 3.0):.2g}'),
             float(f'{geared * KD * larger**1.5:.2g}'))
 
@@ -83,7 +83,7 @@ def set_gains(model: Any, kp: float | None, kd: float | None, robot: Robot) -> N
     driven = model.jnt_dofadr[model.actuator_trnid[:, 0]]
     armature = model.dof_armature[driven]
     model.dof_armature[driven] = np.where(
-        armature > 0.0, armature, STEADY * stiff * model.opt.timestep**2)
+        armature > 0.0, armature, MIN_INERTIA * stiff * model.opt.timestep**2)
 
 
 def set_servos(model: Any, links: Mapping[str, BipedLink], kp: float | None,
@@ -107,14 +107,14 @@ def set_servos(model: Any, links: Mapping[str, BipedLink], kp: float | None,
             model.dof_armature[model.jnt_dofadr[model.actuator_trnid[k, 0]]] = link.armature
 
 
-#: G1: path of the model of the Unitree G1 in the package mjlab.
-G1 = 'asset_zoo/robots/unitree_g1/xmls/g1.xml'
-#: SQUARE: side of a square of the floor, m.
-SQUARE = 0.25
-#: GRAIN: smallest feature of a mesh that is drawn, m; less than a pixel, and far fewer faces.
-GRAIN = 0.004
-#: BALL: radius of a foot in place of a missing one, as a fraction of the leg's length.
-BALL = 0.04
+#: G1_PATH: path of the model of the Unitree G1 in the package mjlab.
+G1_PATH = 'asset_zoo/robots/unitree_g1/xmls/g1.xml'
+#: SQUARE_SIZE: side of a square of the floor, m.
+SQUARE_SIZE = 0.25
+#: Smallest feature of a mesh that is drawn, m; less than a pixel, and far fewer faces.
+MERGE_DISTANCE = 0.004
+#: FOOT_RADIUS: radius of a foot in place of a missing one, as a fraction of the leg's length.
+FOOT_RADIUS = 0.04
 
 
 class SimulationError(CpgError):
@@ -178,7 +178,7 @@ def find_model(name: str) -> Path:
 def _of_mjlab(name: str) -> Path:
     spec = importlib.util.find_spec('mjlab')
     for folder in (spec and spec.submodule_search_locations) or ():
-        if (file := Path(folder) / G1).is_file():
+        if (file := Path(folder) / G1_PATH).is_file():
             return file
     raise SimulationError(f"model '{name}' is of the package mjlab, which is not installed: pip "
                           'install --no-deps mjlab==1.6.0')
@@ -202,8 +202,8 @@ def load(name: str, robot: Robot, kp: float | None = None, kd: float | None = No
         kp: proportional gain, N m / rad; None for what is usual for a robot of this mass.
         kd: damping gain, N m s / rad; the same.
         timestep: of the integration, s.
-        visual: keep what is there for pictures only, meshes coarsened to GRAIN; they take a
-            second to load.
+        visual: keep what is there for pictures only, meshes coarsened by MERGE_DISTANCE; they take
+            a second to load.
         add: adds to the ``mujoco.MjSpec`` before it is compiled.
         say: takes what had to be changed for MuJoCo to take the file, a line for each thing.
 
@@ -365,7 +365,7 @@ def _give_feet(path: Path, robot: Robot, joints: dict[str, Any], say: Callable[[
         foot, radius = (chain.foot - origin) @ axes, chain.radius
         if not radius:
             # The ball ends where the leg does.
-            radius = BALL * float(sum(chain.lengths))
+            radius = FOOT_RADIUS * float(sum(chain.lengths))
             foot *= max(1.0 - radius / max(float(np.linalg.norm(foot)), radius), 0.0)
         last[leg].parent.add_geom(type=engine().mjtGeom.mjGEOM_SPHERE, pos=foot, mass=0.0,
                                   size=[radius, 0.0, 0.0])
@@ -413,7 +413,7 @@ def _surround(spec: Any, base: Any) -> None:
     spec.add_texture(name='checks', type=mujoco.mjtTexture.mjTEXTURE_2D,
                      builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER, width=256, height=256,
                      rgb1=[0.80, 0.82, 0.84], rgb2=[0.62, 0.66, 0.70])
-    material = spec.add_material(name='checks', texrepeat=[0.5 / SQUARE] * 2, texuniform=True)
+    material = spec.add_material(name='checks', texrepeat=[0.5 / SQUARE_SIZE] * 2, texuniform=True)
     material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = 'checks'
     # Whatever can collide with anything collides with the floor.
     world.add_geom(name='floor', type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0.0, 0.0, 0.05],
@@ -430,7 +430,7 @@ def _coarsened(spec: Any, model: Any) -> Any:
         engine().mju_quat2Mat(rotation, model.mesh_quat[k])
         points = (model.mesh_vert[first:first + count] @ rotation.reshape(3, 3).T
                   + model.mesh_pos[k])
-        coarse = merged(Mesh(points, faces), GRAIN)
+        coarse = merged(Mesh(points, faces), MERGE_DISTANCE)
         if len(coarse.triangles) < 20:
             continue
         name = f'{mesh.name} coarse'

@@ -21,21 +21,21 @@ from typing import Any
 from cpg_ros.feedback.kinematics import GRAVITY
 from cpg_ros.fitting.gaits.steady_stretch import true_runs
 from cpg_ros.motion.rotations import rpy_of
-from cpg_ros.simulation.body import Anatomy, Body, FALLEN
+from cpg_ros.simulation.body import Anatomy, Body, MAX_LEAN
 from cpg_ros.simulation.robot_model import engine
 import numpy as np
 
-#: BEGINNING: first part of a run that metrics of the steady gait ignore, s.
-BEGINNING = 2.0
-#: LOOK: time between samples of the feet's positions, s.
-LOOK = 0.01
-#: AIRBORNE: least time with all feet off the floor that counts as a hop, s.
-AIRBORNE = 0.02
+#: SETTLING_TIME: first part of a run that metrics of the steady gait ignore, s.
+SETTLING_TIME = 2.0
+#: SAMPLE_PERIOD: time between samples of the feet's positions, s.
+SAMPLE_PERIOD = 0.01
+#: MIN_FLIGHT_TIME: least time with all feet off the floor that counts as a hop, s.
+MIN_FLIGHT_TIME = 0.02
 
 
 @dataclass(frozen=True)
 class RunMetrics:
-    """Metrics of one run; those marked * exclude its first BEGINNING seconds.
+    """Metrics of one run; those marked * exclude its first SETTLING_TIME seconds.
 
     Attributes:
         distance: forward, along the initial heading, m.
@@ -104,11 +104,11 @@ def metrics_of(body: Body, parts: Anatomy, target: np.ndarray, own: Any,
     legs = len(body.robot.legs)
     force = -sensors[:, :3 * legs].reshape(len(sensors), legs, 3)[:, :, 2]
     touching: np.ndarray = force > 1.0
-    down = (1.0 - 2.0 * (x * x + y * y) < math.cos(FALLEN)) | (sensors[:, 3 * legs] > 0.0)
+    down = (1.0 - 2.0 * (x * x + y * y) < math.cos(MAX_LEAN)) | (sensors[:, 3 * legs] > 0.0)
     fell = float(states[down.argmax(), 0]) if down.any() else math.inf
 
-    later = slice(min(round(BEGINNING / dt), len(states) // 2), None)
-    every = max(1, round(LOOK / dt))
+    later = slice(min(round(SETTLING_TIME / dt), len(states) // 2), None)
+    every = max(1, round(SAMPLE_PERIOD / dt))
     feet = _feet(body, parts, position[later][::every])
     path = np.diff(pose[later, :2], axis=0)
     middle = 0.5 * (yaw[later][1:] + yaw[later][:-1])
@@ -166,9 +166,9 @@ def torques(model: Any, target: np.ndarray, angles: np.ndarray, speeds: np.ndarr
 
 
 def _hops(touching: np.ndarray, dt: float) -> int:
-    """Count the stretches without any foot on the floor that last AIRBORNE."""
+    """Count the stretches without any foot on the floor that last MIN_FLIGHT_TIME."""
     first, last = true_runs(~touching).T
-    return int(((last - first + 1) * dt >= AIRBORNE).sum())
+    return int(((last - first + 1) * dt >= MIN_FLIGHT_TIME).sum())
 
 
 def _feet(body: Body, parts: Anatomy, poses: np.ndarray) -> np.ndarray:

@@ -20,8 +20,8 @@ from cpg_ros.common.errors import ShortRepr
 from cpg_ros.simulation.terrain import Terrain
 import numpy as np
 
-#: PUSH: duration of a push, s.
-PUSH = 0.1
+#: PUSH_DURATION: duration of a push, s.
+PUSH_DURATION = 0.1
 
 
 @dataclass(frozen=True)
@@ -31,8 +31,8 @@ class Scenario:
     Attributes:
         friction: between feet and ground.
         mass: factor of the mass of every link.
-        pushes: each (s, N, N): time, and force on the base forward and to the left for PUSH
-            seconds; see `impulse`.
+        pushes: each (s, N, N): time, and force on the base forward and to the left for
+            PUSH_DURATION s; see `impulse`.
         terrain: ground that is not flat; like all that follows, with feedback only.
         phase: of the first leg at the start of the gait, cycles.
         speed: commanded forward speed, m/s; ignored where the gait cannot be steered.
@@ -62,13 +62,13 @@ class Scenario:
         forces = np.zeros((steps, 2))
         for when, *force in self.pushes:
             begin = round(when / timestep)
-            forces[begin:begin + round(PUSH / timestep)] += force
+            forces[begin:begin + round(PUSH_DURATION / timestep)] += force
         return forces
 
 
 def impulse(when: float, forward: float, left: float) -> tuple[float, float, float]:
     """Return the push that begins at a time, s, with an impulse, N s."""
-    return when, forward / PUSH, left / PUSH
+    return when, forward / PUSH_DURATION, left / PUSH_DURATION
 
 
 @dataclass(frozen=True)

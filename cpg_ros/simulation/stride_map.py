@@ -28,19 +28,19 @@ from cpg_ros.common.errors import InputError, ShortRepr
 from cpg_ros.dynamics.floquet import by_size, Multipliers, multipliers
 from cpg_ros.feedback.gains import Gains, VARIABLES
 from cpg_ros.motion.plan import GaitPlan
-from cpg_ros.simulation.body import FALLEN
+from cpg_ros.simulation.body import MAX_LEAN
 from cpg_ros.simulation.closed_loop import ClosedLoop, ClosedLoopBatch
 from cpg_ros.simulation.robot_model import engine
 from cpg_ros.simulation.scenario import Scenario
 import numpy as np
 
-#: SETTLING: strides before the one that is linearised; STEP: of the finite differences, in the
+#: NUM_SETTLING: strides before the one that is linearised; STEP: of the finite differences, in the
 #: unit of each coordinate; TICK: tick, about, s.
-SETTLING, STEP, TICK = 45, 1e-5, 0.002
-#: PERIODIC: change of the phase over a stride, cycles, that is none.
-PERIODIC = 1e-5
-#: HELD: change up to which a coordinate is the same after a stride, whatever the others are.
-HELD = 1e-9
+NUM_SETTLING, STEP, TICK = 45, 1e-5, 0.002
+#: PHASE_TOLERANCE: change of the phase over a stride, cycles, that is none.
+PHASE_TOLERANCE = 1e-5
+#: Change up to which a coordinate is the same after a stride, whatever the others are.
+CHANGE_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -136,7 +136,7 @@ class _Coordinates:
 
 
 def stride_map(model: str, plan: GaitPlan, gains: Gains | None, speed: float = 0.4, *,
-               settling: int = SETTLING, threads: int = 1) -> StrideMap:
+               settling: int = NUM_SETTLING, threads: int = 1) -> StrideMap:
     """Linearise a robot that follows a gait about its stride.
 
     Central differences disturb every coordinate of a body that has settled on flat ground. What
@@ -163,7 +163,7 @@ def stride_map(model: str, plan: GaitPlan, gains: Gains | None, speed: float = 0
     loop = ClosedLoopBatch(model, plan, timestep=stride / ticks, threads=threads)
     settled = ClosedLoop(loop, [Scenario(speed=speed)], gains, None)
     settled.go(settling * ticks)
-    if np.cos(settled.senses.rpy[0, :2]).prod() < math.cos(FALLEN):
+    if np.cos(settled.senses.rpy[0, :2]).prod() < math.cos(MAX_LEAN):
         raise InputError(f'the {plan.name} falls within {settling} strides')
     count = len(_Coordinates(settled, loop).names)
     offsets = STEP * np.vstack([np.zeros(count), np.eye(count), -np.eye(count)])
@@ -177,11 +177,11 @@ def stride_map(model: str, plan: GaitPlan, gains: Gains | None, speed: float = 0
     gaps = (ends[1:count + 1] - ends[count + 1:]).T
     for phases in (gaps[:1], change[:1]):
         phases[:] = (phases + 0.5) % 1.0 - 0.5
-    if abs(change[0]) > PERIODIC:
+    if abs(change[0]) > PHASE_TOLERANCE:
         raise InputError(f'at {speed:g} m/s the feedback changes the frequency of the '
                          f'{plan.name}: {stride:.4f} s are not its stride; take a lower speed')
     jacobian = gaps / (2.0 * STEP)
-    moves = np.abs(jacobian - np.eye(count)).max(axis=1) > HELD
+    moves = np.abs(jacobian - np.eye(count)).max(axis=1) > CHANGE_TOLERANCE
     moves[0] = True
     jacobian, change = jacobian[np.ix_(moves, moves)], change[moves]
     return StrideMap(stride, tuple(np.array(coordinates.names)[moves].tolist()), jacobian, change,

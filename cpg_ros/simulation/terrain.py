@@ -27,27 +27,27 @@ import numpy as np
 
 #: AHEAD, BEHIND, ASIDE: extent of the ground in front of the robot, behind it and to either side,
 #: m;
-#: GRID: spacing of its heights, m.
-AHEAD, BEHIND, ASIDE, GRID = 8.0, 1.5, 3.0, 0.05
-#: PLACE: half size of the flat place on which the robot starts, m.
-PLACE = 0.5
-#: HIGHEST: largest height of a height field, m; more makes prisms so slender that feet catch.
-HIGHEST = 0.2
+#: GRID_SPACING: spacing of its heights, m.
+AHEAD, BEHIND, ASIDE, GRID_SPACING = 8.0, 1.5, 3.0, 0.05
+#: START_SIZE: half size of the flat place on which the robot starts, m.
+START_SIZE = 0.5
+#: MAX_HEIGHT: largest height of a height field, m; more makes prisms so slender that feet catch.
+MAX_HEIGHT = 0.2
 #: KINDS: kinds of ground that is not flat, see Terrain.
 KINDS = ('height_field', 'boxes', 'stairs', 'waves', 'ramp', 'course')
-#: Stairs. STEPS: number of steps up, and again down; TREAD: length of a tread, m; LANDING: length
-#: of the landing on top, m.
-STEPS, TREAD, LANDING = 5, 0.35, 1.05
-#: THICK: thickness of a step, m; more than the highest landing.
-THICK = 1.2
-#: DEEP: depth of a height field's prisms below its lowest ground, m. Collisions of convex shapes
-#: are searched along the line between their centres, which is about vertical with tall prisms.
-DEEP = 1.0
-#: UNDER: height of a floor under a height field, m, which catches robots that leave the field, and
-#: which feet on the field do not reach.
-UNDER = -0.01
-#: SLAB: half sizes of the slabs of a ramp, m; AWAY: height at which unused ground is parked, m.
-SLAB, AWAY = (6.0, 6.0, 0.5), -50.0
+#: Stairs. NUM_STEPS: number of steps up, and again down; TREAD: length of a tread, m;
+#: LANDING: length of the landing on top, m.
+NUM_STEPS, TREAD, LANDING = 5, 0.35, 1.05
+#: STEP_THICKNESS: thickness of a step, m; more than the highest landing.
+STEP_THICKNESS = 1.2
+#: Depth of a height field's prisms below its lowest ground, m. Collisions of convex shapes are
+#: searched along the line between their centres, which is about vertical with tall prisms.
+PRISM_DEPTH = 1.0
+#: FLOOR_HEIGHT: height of a floor under a height field, m, which catches robots that leave the
+#: field, and which feet on the field do not reach.
+FLOOR_HEIGHT = -0.01
+#: SLAB_SIZE: half sizes of the slabs of a ramp, m; PARKED_HEIGHT: of unused ground, m.
+SLAB_SIZE, PARKED_HEIGHT = (6.0, 6.0, 0.5), -50.0
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class Terrain:
 
     Attributes:
         kind: one of KINDS; a course has a height field, a ramp up and down, and boxes.
-        size: largest height, m, from 0 to HIGHEST, or height of a step; for a ramp its angle,
+        size: largest height, m, from 0 to MAX_HEIGHT, or height of a step; for a ramp its angle,
             positive up, degrees.
         seed: of random heights.
         across: whether a ramp rises to the left instead of ahead.
@@ -74,7 +74,7 @@ class Terrain:
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
             raise SimulationError(f"terrain '{self.kind}' is not one of {', '.join(KINDS)}")
-        low, high = (-45.0, 45.0) if self.kind == 'ramp' else (0.0, HIGHEST)
+        low, high = (-45.0, 45.0) if self.kind == 'ramp' else (0.0, MAX_HEIGHT)
         if not low <= self.size <= high:
             raise SimulationError(f"the size {self.size:g} of the terrain '{self.kind}' is not "
                                   f'from {low:g} to {high:g}'
@@ -83,8 +83,8 @@ class Terrain:
 
 def grid() -> tuple[np.ndarray, np.ndarray]:
     """Return the coordinates of rows (to the left) and of columns (ahead), m."""
-    return (np.linspace(-ASIDE, ASIDE, round(2.0 * ASIDE / GRID) + 1),
-            np.linspace(-BEHIND, AHEAD, round((AHEAD + BEHIND) / GRID) + 1))
+    return (np.linspace(-ASIDE, ASIDE, round(2.0 * ASIDE / GRID_SPACING) + 1),
+            np.linspace(-BEHIND, AHEAD, round((AHEAD + BEHIND) / GRID_SPACING) + 1))
 
 
 def heights(terrain: Terrain) -> np.ndarray:
@@ -100,7 +100,7 @@ def heights(terrain: Terrain) -> np.ndarray:
              'course': _course}[terrain.kind](terrain, x, y, rng)
     # Keep the ground flat where the robot starts.
     away = np.maximum(np.abs(x)[None, :], np.abs(y)[:, None])
-    return surface * np.clip((away - PLACE) / (0.2 * PLACE), 0.0, 1.0)
+    return surface * np.clip((away - START_SIZE) / (0.2 * START_SIZE), 0.0, 1.0)
 
 
 def _rough(terrain: Terrain, x: np.ndarray, y: np.ndarray, rng: np.random.Generator
@@ -134,7 +134,7 @@ def _course(terrain: Terrain, x: np.ndarray, y: np.ndarray, rng: np.random.Gener
             ) -> np.ndarray:
     """Return a height field up to 3 m, a ramp of 15 degrees up and down, boxes from 5.5 m on."""
     slope = math.tan(math.radians(15.0))
-    ramp = np.clip(slope * np.minimum(x - 3.0, 5.3 - x), 0.0, HIGHEST)
+    ramp = np.clip(slope * np.minimum(x - 3.0, 5.3 - x), 0.0, MAX_HEIGHT)
     return np.where(x < 2.8, _rough(terrain, x, y, rng),
                     np.where(x > 5.5, _boxes(terrain, x, y, rng), np.tile(ramp, (y.size, 1))))
 
@@ -148,16 +148,17 @@ def add_ground(spec: Any) -> None:
         far['material'] = 'checks'
     rows, columns = (side.size for side in grid())
     spec.add_hfield(name='ground', nrow=rows, ncol=columns, userdata=np.zeros(rows * columns),
-                    size=[0.5 * (AHEAD + BEHIND), ASIDE, HIGHEST, DEEP])
+                    size=[0.5 * (AHEAD + BEHIND), ASIDE, MAX_HEIGHT, PRISM_DEPTH])
     spec.worldbody.add_geom(name='ground', type=kinds.mjGEOM_HFIELD, hfieldname='ground',
-                            pos=[0.5 * (AHEAD - BEHIND), 0.0, AWAY], **far)
+                            pos=[0.5 * (AHEAD - BEHIND), 0.0, PARKED_HEIGHT], **far)
     for name in ('start', 'ramp'):
-        spec.worldbody.add_geom(name=name, type=kinds.mjGEOM_BOX, size=SLAB,
-                                pos=[0.0, 0.0, AWAY], **far)
-    for step in range(STEPS):
-        spec.worldbody.add_geom(name=f'step_{step}', type=kinds.mjGEOM_BOX, pos=[0.0, 0.0, AWAY],
-                                size=[0.5 * LANDING + (STEPS - 1 - step) * TREAD, ASIDE,
-                                      0.5 * THICK], **far)
+        spec.worldbody.add_geom(name=name, type=kinds.mjGEOM_BOX, size=SLAB_SIZE,
+                                pos=[0.0, 0.0, PARKED_HEIGHT], **far)
+    for step in range(NUM_STEPS):
+        spec.worldbody.add_geom(name=f'step_{step}', type=kinds.mjGEOM_BOX,
+                                pos=[0.0, 0.0, PARKED_HEIGHT],
+                                size=[0.5 * LANDING + (NUM_STEPS - 1 - step) * TREAD, ASIDE,
+                                      0.5 * STEP_THICKNESS], **far)
 
 
 def lay(model: Any, terrain: Terrain) -> None:
@@ -168,14 +169,14 @@ def lay(model: Any, terrain: Terrain) -> None:
     model.geom_sameframe[model.geom('ramp').id] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
     positions, floor = model.geom_pos, model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE
     if terrain.kind == 'stairs':
-        for step in range(STEPS):
+        for step in range(NUM_STEPS):
             geom = model.geom(f'step_{step}').id
             model.geom_sameframe[geom] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
-            positions[geom] = (PLACE + (STEPS - 1) * TREAD + 0.5 * LANDING, 0.0,
-                           (step + 1) * terrain.size - 0.5 * THICK)
+            positions[geom] = (START_SIZE + (NUM_STEPS - 1) * TREAD + 0.5 * LANDING, 0.0,
+                           (step + 1) * terrain.size - 0.5 * STEP_THICKNESS)
         return
     model.geom_sameframe[floor] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
-    positions[floor, 2] = AWAY
+    positions[floor, 2] = PARKED_HEIGHT
     if terrain.kind == 'ramp':
         half = 0.5 * math.radians(terrain.size)
         ramp = model.geom('ramp').id
@@ -183,16 +184,16 @@ def lay(model: Any, terrain: Terrain) -> None:
         model.geom_quat[ramp] = math.cos(half), *(math.sin(half) * axis), 0.0
         # The upper edge of the slab ends the flat place.
         edge = np.zeros(3)
-        corner = np.array([-SLAB[0], 0.0, SLAB[2]])
+        corner = np.array([-SLAB_SIZE[0], 0.0, SLAB_SIZE[2]])
         mujoco.mju_rotVecQuat(edge, corner, model.geom_quat[ramp])
-        positions[ramp] = np.array([PLACE, 0.0, 0.0]) - edge
-        positions[model.geom('start').id] = PLACE - SLAB[0], 0.0, -SLAB[2]
+        positions[ramp] = np.array([START_SIZE, 0.0, 0.0]) - edge
+        positions[model.geom('start').id] = START_SIZE - SLAB_SIZE[0], 0.0, -SLAB_SIZE[2]
         return
-    positions[floor, 2] = UNDER
+    positions[floor, 2] = FLOOR_HEIGHT
     # At edges between prisms, MuJoCo's own collision of convex shapes pushes feet sideways: on a
     # field 1 mm high robots fell that walk on a plane. With libccd's they walk as on the plane.
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_NATIVECCD
-    model.hfield_data[:] = heights(terrain).ravel() / HIGHEST
+    model.hfield_data[:] = heights(terrain).ravel() / MAX_HEIGHT
     positions[model.geom('ground').id, 2] = 0.0
 
 

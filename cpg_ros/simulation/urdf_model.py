@@ -33,8 +33,8 @@ import numpy as np
 
 # Meshes that MuJoCo cannot read: the reasons, and the convex hulls that take their place.
 
-#: FLAT: least size of a mesh in each dimension with which it has a hull, m.
-FLAT = 1e-6
+#: MIN_HULL_SIZE: least size of a mesh in each dimension with which it has a hull, m.
+MIN_HULL_SIZE = 1e-6
 
 
 def trouble(path: Path) -> str:
@@ -62,7 +62,7 @@ def hull(path: Path) -> bytes:
     """
     from scipy.spatial import ConvexHull, QhullError
     points = read_mesh(path).points
-    if len(points) < 4 or np.ptp(points, axis=0).min() < FLAT:
+    if len(points) < 4 or np.ptp(points, axis=0).min() < MIN_HULL_SIZE:
         raise MeshError(f'{path}: {len(points)} points that enclose no volume')
     try:
         convex = ConvexHull(points)
@@ -75,18 +75,18 @@ def hull(path: Path) -> bytes:
 
 # Corrections of masses and inertias in URDF files that no body can have.
 
-#: THINNEST: least second moment in any direction, as a fraction of their sum.
-THINNEST = 1e-3
-#: ROUNDING: violation, as a fraction of the sum, up to which it is corrected without a message.
-ROUNDING = 1e-4
-#: POINT: radius of gyration below which a body counts as a point, m; GIANT: over the length of the
-#: robot's longest link, above which an inertia is wrong, as of other units.
-POINT, GIANT = 1e-4, 2.0
+#: MIN_MOMENT: least second moment in any direction, as a fraction of their sum.
+MIN_MOMENT = 1e-3
+#: Violation, as a fraction of the sum, up to which it is corrected without a message.
+MOMENT_TOLERANCE = 1e-4
+#: MIN_GYRATION: radius of gyration below which a body counts as a point, m; MAX_GYRATION: over the
+#: length of the robot's longest link, above which an inertia is wrong, as of other units.
+MIN_GYRATION, MAX_GYRATION = 1e-4, 2.0
 #: DENSITY: assumed for a body with a mass but no extent, and for one without mass, kg/m^3.
 DENSITY = 1000.0
-#: Mass of a link without mass that a joint moves. LEAST: fraction of the robot's mass; LIGHTEST:
-#: least mass, kg.
-LEAST, LIGHTEST = 1e-3, 1e-2
+#: Mass of a link without mass that a joint moves. MIN_MASS_FRACTION: fraction of the robot's mass;
+#: MIN_MASS: least mass, kg.
+MIN_MASS_FRACTION, MIN_MASS = 1e-3, 1e-2
 
 
 def moments(matrix: np.ndarray) -> np.ndarray:
@@ -111,16 +111,16 @@ def possible(matrix: np.ndarray, mass: float, longest: float = math.inf
     sizes, axes = np.linalg.eigh(moments(matrix))
     # The square of the radius of gyration about a point.
     square = sizes.sum() / mass
-    if not square > POINT**2:
+    if not square > MIN_GYRATION**2:
         return ball(mass) * np.eye(3), 'is that of a point'
-    if square > (GIANT * longest)**2:
+    if square > (MAX_GYRATION * longest)**2:
         return ball(mass) * np.eye(3), (
             f'needs parts {math.sqrt(square):.2g} m away, beside links of up to {longest:.2g} m')
-    held = np.maximum(sizes, THINNEST * sizes.sum())
+    held = np.maximum(sizes, MIN_MOMENT * sizes.sum())
     if np.array_equal(held, sizes):
         return matrix, ''
     made = np.trace(np.diag(held)) * np.eye(3) - (axes * held) @ axes.T
-    broken = sizes[0] < -ROUNDING * sizes.sum()
+    broken = sizes[0] < -MOMENT_TOLERANCE * sizes.sum()
     return made, 'breaks the triangle inequality (a + b >= c)' if broken else ''
 
 
@@ -131,15 +131,15 @@ def ball(mass: float) -> float:
 
 
 #: Names of an inertia's numbers in a URDF.
-_KEYS = ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')
-#: FRAME: negligible mass, kg, and moment of inertia, kg m^2, of a frame that has none.
-FRAME = 1e-6, 1e-9
-#: NOTHING: mass up to which a link has none, kg; CAD programs write rounding errors.
-NOTHING = 1e-9
-#: HOLLOW: density of the collision shapes of a robot without any mass, kg/m^3.
-HOLLOW = 500.0
-#: Types of joints. HELD: the link is fixed to its parent; FREE: it moves freely.
-HELD, FREE = 'fixed', 'floating'
+_INERTIA_KEYS = ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')
+#: FRAME_INERTIA: negligible mass, kg, and moment of inertia, kg m^2, of a frame that has none.
+FRAME_INERTIA = 1e-6, 1e-9
+#: MASS_TOLERANCE: mass up to which a link has none, kg; CAD programs write rounding errors.
+MASS_TOLERANCE = 1e-9
+#: HOLLOW_DENSITY: density of the collision shapes of a robot without any mass, kg/m^3.
+HOLLOW_DENSITY = 500.0
+#: Types of joints. FIXED: the link is fixed to its parent; FLOATING: it moves freely.
+FIXED, FLOATING = 'fixed', 'floating'
 
 Say = Callable[[str], None]
 
@@ -180,7 +180,7 @@ def read_urdf(path: Path, driven: Collection[str], visual: bool, say: Say) -> An
                                      assets=meshes.assets)
     if weightless:
         for geom in spec.geoms:
-            geom.density = HOLLOW
+            geom.density = HOLLOW_DENSITY
     return spec
 
 
@@ -274,8 +274,8 @@ def _hold(robot: ElementTree.Element, driven: Collection[str], say: Say) -> None
     """Fix joints that nothing drives."""
     held = []
     for joint in robot.findall('joint'):
-        if joint.get('name') not in driven and joint.get('type') not in (HELD, FREE):
-            joint.set('type', HELD)
+        if joint.get('name') not in driven and joint.get('type') not in (FIXED, FLOATING):
+            joint.set('type', FIXED)
             held.append(joint.get('name', ''))
     if held:
         say(f'joints that the robot file does not drive are held at 0: {", ".join(held)}')
@@ -284,12 +284,13 @@ def _hold(robot: ElementTree.Element, driven: Collection[str], say: Say) -> None
 def _weigh(robot: ElementTree.Element, say: Say) -> float:
     """Give each link a mass and an inertia that a body can have; return the total before."""
     moved = {child.get('link') for joint in robot.findall('joint')
-             if joint.get('type') != HELD and (child := joint.find('child')) is not None}
+             if joint.get('type') != FIXED and (child := joint.find('child')) is not None}
     links = {link.get('name', ''): link for link in robot.findall('link')}
     masses = {name: _mass(link) for name, link in links.items()}
     total = sum(masses.values())
     if not total:
-        say(f'no link has a mass: they get those of their collision shapes at {HOLLOW:g} kg/m^3')
+        say('no link has a mass: they get those of their collision shapes at '
+            f'{HOLLOW_DENSITY:g} kg/m^3')
     longest = max((float(np.linalg.norm(numbers(origin.get('xyz', ''), 3)))
                    for origin in robot.iterfind('joint/origin')), default=0.0)
     repaired: dict[tuple[str, str], list[str]] = {}
@@ -299,7 +300,7 @@ def _weigh(robot: ElementTree.Element, say: Say) -> float:
             made, wrong = possible(_inertia(inertial), mass, longest or math.inf)
             if wrong:
                 made_text = ', '.join(f'{key} {value:.3g}' for key, value in
-                                    zip(_KEYS, made[np.triu_indices(3)], strict=True))
+                                    zip(_INERTIA_KEYS, made[np.triu_indices(3)], strict=True))
                 repaired.setdefault((wrong, made_text), []).append(name)
             _write(inertial, mass, made)
             continue
@@ -308,9 +309,9 @@ def _weigh(robot: ElementTree.Element, say: Say) -> float:
             link.remove(inertial)
         if not total and link.find('collision') is not None:
             continue
-        mass, moment = FRAME
+        mass, moment = FRAME_INERTIA
         if name in moved and not _carries(robot, name, masses):
-            mass = max(LEAST * total, LIGHTEST)
+            mass = max(MIN_MASS_FRACTION * total, MIN_MASS)
             moment = ball(mass)
             say(f"link '{name}': has no mass, but a joint moves it; it gets {mass:.3g} kg")
         _write(ElementTree.SubElement(link, 'inertial'), mass, moment * np.eye(3))
@@ -323,7 +324,7 @@ def _weigh(robot: ElementTree.Element, say: Say) -> float:
 def _carries(robot: ElementTree.Element, name: str, masses: dict[str, float]) -> bool:
     """Return whether links with mass are fixed to a link."""
     below = [child.get('link', '') for joint in robot.findall('joint')
-             if joint.get('type') == HELD and (parent := joint.find('parent')) is not None
+             if joint.get('type') == FIXED and (parent := joint.find('parent')) is not None
              and parent.get('link') == name and (child := joint.find('child')) is not None]
     return any(masses.get(link, 0.0) > 0.0 or _carries(robot, link, masses) for link in below)
 
@@ -332,13 +333,13 @@ def _mass(link: ElementTree.Element) -> float:
     """Return a link's mass in kg, 0 where it is nothing."""
     given = link.find('inertial/mass')
     mass = 0.0 if given is None else sum(numbers(given.get('value', '0'), 1))
-    return mass if mass > NOTHING else 0.0
+    return mass if mass > MASS_TOLERANCE else 0.0
 
 
 def _inertia(inertial: ElementTree.Element) -> np.ndarray:
     given = inertial.find('inertia')
     xx, xy, xz, yy, yz, zz = (0.0 if given is None else sum(numbers(given.get(key, '0'), 1))
-                              for key in _KEYS)
+                              for key in _INERTIA_KEYS)
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
@@ -349,7 +350,7 @@ def _write(inertial: ElementTree.Element, mass: float, matrix: np.ndarray) -> No
     ElementTree.SubElement(inertial, 'mass', value=repr(float(mass)))
     ElementTree.SubElement(inertial, 'inertia', {
         key: repr(float(value)) for key, value in
-        zip(_KEYS, matrix[np.triu_indices(3)], strict=True)})
+        zip(_INERTIA_KEYS, matrix[np.triu_indices(3)], strict=True)})
 
 
 # A model as URDF, for the topic ``robot_description``.

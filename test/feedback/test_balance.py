@@ -30,7 +30,7 @@ from ticked_pattern import TickedPattern
 pytest.importorskip('mujoco')
 
 from cpg_ros.simulation.biped_run import BipedRun  # noqa: E402
-from cpg_ros.simulation.scenario import PUSH  # noqa: E402
+from cpg_ros.simulation.scenario import PUSH_DURATION  # noqa: E402
 
 DT = 0.002
 
@@ -123,7 +123,7 @@ def test_after_a_fall_it_holds_the_stand_until_it_is_put_on_its_feet(walker):
     pattern.command = 0.2, 0.0, 0.0
     pattern.enable(True, 1.0)
     walker.go(4.0)
-    body.push(np.array([0.0, 1200.0, 0.0]), PUSH)
+    body.push(np.array([0.0, 1200.0, 0.0]), PUSH_DURATION)
     walker.go(2.5)
     assert pattern.falls == 1 and pattern.fallen and not pattern.balancing
     np.testing.assert_allclose(pattern.position, pattern.robot.column('offset'))

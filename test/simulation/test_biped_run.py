@@ -34,7 +34,7 @@ from cpg_ros.simulation.biped_run import BipedRun  # noqa: E402
 from cpg_ros.simulation.robot_model import find_model, SimulationError  # noqa: E402
 from cpg_ros.simulation.robot_setup.model_reading import read_biped  # noqa: E402
 from cpg_ros.simulation.scenario import impulse, SensorNoise  # noqa: E402
-from cpg_ros.simulation.terrain import PLACE, Terrain  # noqa: E402
+from cpg_ros.simulation.terrain import START_SIZE, Terrain  # noqa: E402
 
 #: Sensors as of benchmarks/bench_humanoid.py.
 NOISE = SensorNoise(delay=0.004, gyroscope_noise=0.02, accelerometer_noise=0.1, force_noise=0.05)
@@ -336,12 +336,13 @@ def test_where_the_g1_comes_from_is_said(monkeypatch):
 
 @pytest.mark.parametrize('angle', [3.0, -3.0])
 def test_it_climbs_and_descends_a_ramp(angle):
-    """As high as the ramp is where it is, which begins PLACE ahead."""
+    """As high as the ramp is where it is, which begins START_SIZE ahead."""
     run = BipedRun('humanoid', load_robot('humanoid'), NOISE, terrain=Terrain('ramp', angle))
     found = run.run(12.0, ((1.0, 0.3, 0.0, 0.0),), seed=15)
     assert math.isinf(found.fell)
     assert found.speed[0] == pytest.approx(0.3, abs=0.05)
     # From where it walks, which is lower than it stands, but before the ramp.
-    x, z = found.path[found.path[:, 1] > PLACE - 0.1][[0, -1]].T[[1, 3]]
+    x, z = found.path[found.path[:, 1] > START_SIZE - 0.1][[0, -1]].T[[1, 3]]
     assert x[1] > 2.0
-    assert z[1] - z[0] == pytest.approx((x[1] - PLACE) * math.tan(math.radians(angle)), abs=0.03)
+    rise = (x[1] - START_SIZE) * math.tan(math.radians(angle))
+    assert z[1] - z[0] == pytest.approx(rise, abs=0.03)

@@ -17,7 +17,7 @@
 import importlib.util
 
 from cpg_ros.motion.pattern import Pattern
-from cpg_ros.simulation.body import Approach, Body, NEAR
+from cpg_ros.simulation.body import Approach, Body, FOLLOWED_DISTANCE
 from go2 import DT, GO2, program
 from hypothesis import given
 from hypothesis import strategies as st
@@ -36,7 +36,7 @@ def test_it_is_there_in_time_and_never_hurries(start, wanted, periods):
     assert np.array_equal(approach.towards(start), start)
     path = np.array([start] + [approach.towards(wanted).copy() for _ in range(periods)])
     assert path[-1] == pytest.approx(wanted, abs=1e-12)
-    if way > NEAR:
+    if way > FOLLOWED_DISTANCE:
         # A smooth step is at most 1.5 times as fast as an even one, and goes straight on.
         assert np.abs(np.diff(path, axis=0)).max() <= 1.5 * way / periods + 1e-12
         assert np.all(np.diff(path, axis=0) * (wanted - start) >= -1e-12)

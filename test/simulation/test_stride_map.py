@@ -70,7 +70,7 @@ def test_small_pushes_decay_as_the_slowest_multiplier_that_they_excite_says(trot
 
 def test_a_body_that_falls_has_no_stride(monkeypatch):
     # No gait of the Go2 falls by itself: let a tilt of 1e-4 rad count as a fall.
-    monkeypatch.setattr('cpg_ros.simulation.stride_map.FALLEN', 1e-4)
+    monkeypatch.setattr('cpg_ros.simulation.stride_map.MAX_LEAN', 1e-4)
     with pytest.raises(InputError, match='the trot falls within 3 strides'):
         stride_map('go2', program('trot'), None, settling=3)
 

@@ -57,20 +57,20 @@ def test_no_edge_of_a_low_field_trips_a_walk_that_turns_on_the_spot(walk):
 
 def test_steps_have_edges_and_lead_up_and_down(walk):
     """A ball put down on each tread rests on it; in front of the first step is the floor."""
-    from cpg_ros.simulation.terrain import LANDING, PLACE, STEPS, TREAD
+    from cpg_ros.simulation.terrain import LANDING, NUM_STEPS, START_SIZE, TREAD
     import mujoco
     model = walk.model(Scenario(terrain=Terrain('stairs', 0.12)))
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    edges = PLACE + TREAD * np.arange(STEPS)
-    end = edges[-1] + LANDING + TREAD * np.arange(STEPS)
+    edges = START_SIZE + TREAD * np.arange(NUM_STEPS)
+    end = edges[-1] + LANDING + TREAD * np.arange(NUM_STEPS)
     heights = []
     for x in (*(edges - 0.01), edges[-1] + 0.01, *(end + 0.01)):
         geom, distance = np.zeros(1, np.int32), 0.0
         distance = mujoco.mj_ray(model, data, np.array([x, 1.0, 3.0]), np.array([0.0, 0.0, -1.0]),
                                  None, 1, -1, geom)
         heights.append(round(3.0 - distance, 6))
-    up = [0.12 * k for k in range(STEPS + 1)]
+    up = [0.12 * k for k in range(NUM_STEPS + 1)]
     assert heights == pytest.approx([*up, *up[-2::-1]])
 
 

@@ -40,7 +40,7 @@ from cpg_ros.ros.kernels import StartProgress
 from cpg_ros.ros.node.client import CallError, NodeClient, RequestRefused, ServiceClients
 from cpg_ros.ros.node.polled import latched
 from cpg_ros.simulation.robot_model import find_model
-from cpg_ros.simulation.robot_setup.leg_chains import FACING
+from cpg_ros.simulation.robot_setup.leg_chains import DIRECTIONS
 from geometry_msgs.msg import Pose, Quaternion
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
@@ -231,9 +231,9 @@ class DemoRobot:
 
 def add_options(parser: ArgumentParser) -> None:
     """Add the options that select a user's own robot."""
-    parser.add_argument('--forward', choices=FACING, help='with --urdf: direction in which the '
-                        'robot faces, where check_robot asks for it; other than x, a URDF that is '
-                        'turned to x is written beside the file, and used')
+    parser.add_argument('--forward', choices=DIRECTIONS, help='with --urdf: direction in which '
+                        'the robot faces, where check_robot asks for it; other than x, a URDF '
+                        'that is turned to x is written beside the file, and used')
     parser.add_argument('--legs', nargs='+', metavar='LEG=TEXT', help='with --urdf or --mjcf: the '
                         'legs, each with a part of the names of its joints, such as lf=leg1_')
     parser.add_argument('--velocity', type=number, metavar='RAD/S', help="with --urdf or --mjcf: "

@@ -34,14 +34,14 @@ from cpg_ros.motion.plan import plan_gait
 from cpg_ros.motion.robot import Robot
 from cpg_ros.motion.robot_file import load_robot, write_robot
 from cpg_ros.networks.registry import NETWORKS
-from cpg_ros.simulation.robot_setup.walk_recording import read_walk, TYPES, WalkRecording
+from cpg_ros.simulation.robot_setup.walk_recording import read_walk, TOPIC_TYPES, WalkRecording
 import numpy as np
 
-#: LAG: delay of the joints behind the pattern, s, for bags without a phase: that of a loaded servo
-#: whose damping is a thirtieth of its stiffness.
-LAG = 0.045
-#: SAME: difference of the speeds up to which two rows of a table are the same, m/s.
-SAME = 0.02
+#: JOINT_DELAY: delay of the joints behind the pattern, s, for bags without a phase: that of a
+#: loaded servo whose damping is a thirtieth of its stiffness.
+JOINT_DELAY = 0.045
+#: SPEED_TOLERANCE: difference of the speeds up to which two rows of a table are the same, m/s.
+SPEED_TOLERANCE = 0.02
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ def efference_from(recording: WalkRecording, robot: Robot, gait: str | None = No
     if recording.phase is not None:
         phases = recording.phase[inside]
     else:
-        phases = stride.warp(times[inside]) + LAG * stride.frequency + _shift(
+        phases = stride.warp(times[inside]) + JOINT_DELAY * stride.frequency + _shift(
             stride.theta, stride.mean.T, Timetable(gait_plan, geometry), columns)
     signals = np.concatenate([velocity, felt.angular_velocity[:, :2], felt.rpy[:, :2]],
                              axis=1)[inside]
@@ -155,7 +155,7 @@ def with_efference(robot: Robot, calibrated: Sequence[Calibrated]) -> Robot:
         speeds, table = np.empty(0), np.empty((0, BINS, SIGNALS))
         for recording in calibrated:
             if recording.gait == gait:
-                other = np.abs(speeds - recording.speed) > SAME
+                other = np.abs(speeds - recording.speed) > SPEED_TOLERANCE
                 speeds = np.append(speeds[other], recording.copy.speeds)
                 table = np.concatenate([table[other], recording.copy.table])
         if len(speeds) > SPEEDS:
@@ -165,7 +165,7 @@ def with_efference(robot: Robot, calibrated: Sequence[Calibrated]) -> Robot:
             efference = EfferenceCopy.of(motion.efference)
             apart = np.abs(efference.speeds[:, None] - speeds).min(axis=1)
             farthest = np.argsort(-apart, kind='stable')[:SPEEDS - len(speeds)]
-            remaining = farthest[apart[farthest] > SAME]
+            remaining = farthest[apart[farthest] > SPEED_TOLERANCE]
             speeds = np.append(efference.speeds[remaining], speeds)
             table = np.concatenate([efference.table[remaining], table])
         rising = np.argsort(speeds)
@@ -209,7 +209,7 @@ def _parser() -> Parser:
                         help='true speeds, one for each bag, as measured with a tape and a clock '
                         '(default: estimated from the legs, which is wrong where feet slip or '
                         'give way)')
-    for key, kind in TYPES.items():
+    for key, kind in TOPIC_TYPES.items():
         parser.add_argument(f'--{key.replace("_", "-")}', metavar='TOPIC',
                             default={'phase': 'cpg_generator/phase'}.get(key, key),
                             help=f'{kind} (default: %(default)s)')
@@ -247,7 +247,7 @@ def _calibrate(args: argparse.Namespace) -> int:
                   '') for gait in gaits
                  if (measured := robot.motions[gait].efference) is not None]
     else:
-        topics = {key: getattr(args, key) for key in TYPES}
+        topics = {key: getattr(args, key) for key in TOPIC_TYPES}
         count = len(args.bags)
         walks = [efference_from(read_walk(bag, robot, topics), robot, gait, speed)
                  for bag, gait, speed in zip(

@@ -43,7 +43,7 @@ from cpg_ros.simulation.robot_setup.description_match import (
     walking_faults,
 )
 from cpg_ros.simulation.robot_setup.first_robot import robot_from
-from cpg_ros.simulation.robot_setup.leg_chains import FACING, legs_in
+from cpg_ros.simulation.robot_setup.leg_chains import DIRECTIONS, legs_in
 from cpg_ros.simulation.robot_setup.model_reading import geometry_from, load_mjcf, read_biped
 
 DESCRIPTION = """\
@@ -80,7 +80,7 @@ def _parser() -> Parser:
     parser.add_argument('--legs', nargs='+', default=[], metavar='LEG=TEXT', help='the legs for '
                         '--make, each with a part of the names of its joints: lf=leg1_ rf=leg2_ '
                         'lh=leg3_ rh=leg4_')
-    parser.add_argument('--forward', choices=FACING, default='', help='direction in which the '
+    parser.add_argument('--forward', choices=DIRECTIONS, default='', help='direction in which the '
                         'robot faces, for --make, where names and positions disagree; other than '
                         'x, a URDF that is turned to x is written beside the first')
     parser.add_argument('--velocity', type=number, metavar='RAD/S', help='velocity limit of all '
@@ -212,7 +212,7 @@ def turned(urdf: Path, forward: str) -> Path:
     if path.exists():
         raise InputError(f'--forward {forward}: {path} already exists')
     tree, root = ElementTree.parse(urdf), load_urdf(urdf).root()
-    angle = -0.5 * pi * FACING.index(forward)
+    angle = -0.5 * pi * DIRECTIONS.index(forward)
     ElementTree.SubElement(tree.getroot(), 'link', name='facing_x')
     joint = ElementTree.SubElement(tree.getroot(), 'joint', name='facing_x_joint', type='fixed')
     ElementTree.SubElement(joint, 'parent', link='facing_x')

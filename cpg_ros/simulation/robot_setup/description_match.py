@@ -43,27 +43,27 @@ from cpg_ros.networks.registry import NETWORKS
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-#: ROUNDING: difference of limits, rad or rad/s, that is ignored, as files have rounded limits.
-ROUNDING = 1e-4
-#: Differences of lengths that are ignored. LENGTH_SHARE: by the length; LENGTH: m.
-LENGTH_SHARE, LENGTH = 0.05, 0.003
-#: MASS_RATIO: ratio of masses up to which they agree.
-MASS_RATIO = 1.25
-#: LONGEST_LEG: length of the longest leg of a robot, m; DENSITIES: least and largest mass over the
-#: cube of the longest leg, kg/m^3 (of robots 50 to 600).
-LONGEST_LEG, DENSITIES = 5.0, (5.0, 6000.0)
-#: FORWARD: fraction of a stride by which a foot must go the wrong way; LEAST: least way of a foot,
-#: over the leg's length.
-FORWARD, LEAST = 0.25, 0.002
-#: LEVEL: largest tilt of a sole in the stand, rad.
-LEVEL = 0.1
-#: A flat foot. PLANE: least cosine between normals on one face; FLAT: least area of its face over
-#: that of its shadow; PARTLY: the same of a foot with a heel and toes, from below.
-PLANE, FLAT, PARTLY = 0.98, 0.5, 0.2
+#: Difference of limits, rad or rad/s, that is ignored, as files have rounded limits.
+LIMIT_TOLERANCE = 1e-4
+#: Differences of lengths that are ignored. LENGTH_RTOL: by the length; LENGTH_ATOL: m.
+LENGTH_RTOL, LENGTH_ATOL = 0.05, 0.003
+#: MAX_MASS_RATIO: ratio of masses up to which they agree.
+MAX_MASS_RATIO = 1.25
+#: MAX_LEG_LENGTH: length of the longest leg of a robot, m; DENSITY_RANGE: least and largest mass
+#: over the cube of the longest leg, kg/m^3 (of robots 50 to 600).
+MAX_LEG_LENGTH, DENSITY_RANGE = 5.0, (5.0, 6000.0)
+#: BACKWARD_FRACTION: fraction of a stride by which a foot must go the wrong way; MIN_MOTION: least
+#: way of a foot, over the leg's length.
+BACKWARD_FRACTION, MIN_MOTION = 0.25, 0.002
+#: MAX_SOLE_TILT: largest tilt of a sole in the stand, rad.
+MAX_SOLE_TILT = 0.1
+#: A flat foot. MIN_FACE_COSINE: between normals on one face; MIN_FLATNESS: area of its face over
+#: that of its shadow; MIN_TOE_FLATNESS: the same of a foot with a heel and toes, from below.
+MIN_FACE_COSINE, MIN_FLATNESS, MIN_TOE_FLATNESS = 0.98, 0.5, 0.2
 #: FORWARD_GAITS: gaits in which a robot walks forward, with alternating legs.
 FORWARD_GAITS = ('walk', 'trot', 'pace', 'tripod', 'run')
-#: USUAL_FREQUENCY: default stride frequency, Hz.
-USUAL_FREQUENCY = 1.0
+#: DEFAULT_FREQUENCY: default stride frequency, Hz.
+DEFAULT_FREQUENCY = 1.0
 
 
 @dataclass(frozen=True)
@@ -218,7 +218,7 @@ def walking_faults(robot: Robot, known: RobotDescription,
         if NETWORKS[network].presets()[name].gait in FORWARD_GAITS:
             with suppress(PlanError):    # which the gait's own check reports
                 return faults + list(_missteps(robot, known, plan_gait(
-                    unlimited(robot), name, USUAL_FREQUENCY, network=network)))
+                    unlimited(robot), name, DEFAULT_FREQUENCY, network=network)))
     return faults
 
 
@@ -267,7 +267,7 @@ def _misplaced(robot: Robot, known: RobotDescription) -> Iterator[str]:
                    f"joints' limits, axes or offsets do not let it stand")
         if len(robot.legs) == 2 and len(chain.joints) > 4:
             up = sole_up(known, chain.joints[-1])
-            if (tilt := acos(min(1.0, float((frame @ up)[2])))) > LEVEL:
+            if (tilt := acos(min(1.0, float((frame @ up)[2])))) > MAX_SOLE_TILT:
                 yield f'{leg}: in the stand its sole is {tilt:.2g} rad off level'
 
 
@@ -288,14 +288,14 @@ def sole_up(known: RobotDescription, last: str) -> np.ndarray:
 
     def flat(down: np.ndarray) -> float:
         """Return the area of the face on a side, divided by that of the shadow on its plane."""
-        return float(2.0 * areas[normals @ down > PLANE].sum()
+        return float(2.0 * areas[normals @ down > MIN_FACE_COSINE].sum()
                      / max(np.abs(normals @ down) @ areas, 1e-12))
 
     # Of the top and the bottom, the one that is further from the ankle.
     down = max(normals, key=lambda normal: (
-        round(areas[normals @ normal > PLANE].sum() / areas.sum(), 2),
+        round(areas[normals @ normal > MIN_FACE_COSINE].sum() / areas.sum(), 2),
         np.max((points - ankle) @ normal)))
-    return up if flat(-up) > PARTLY or flat(down) < FLAT else -down
+    return up if flat(-up) > MIN_TOE_FLATNESS or flat(down) < MIN_FLATNESS else -down
 
 
 def _missteps(robot: Robot, known: RobotDescription, gait: GaitPlan) -> Iterator[str]:
@@ -314,11 +314,11 @@ def _missteps(robot: Robot, known: RobotDescription, gait: GaitPlan) -> Iterator
         height = path[:, 2] + 0.5 * (np.roll(path[:, 2], -1) - path[:, 2])
         low = height < np.median(height)
         stride, lift = float(np.ptp(path[:, 0])), float(np.ptp(path[:, 2]))
-        if lift > 0.02 * stride and steps[low].sum() > FORWARD * stride > 0.0:
+        if lift > 0.02 * stride and steps[low].sum() > BACKWARD_FRACTION * stride > 0.0:
             yield (f'{leg}: its foot moves forward while it is low in the {gait.name}, so that '
                    f'the robot walks backward: are the axes of the {known.format} turned the '
                    'other way?')
-        elif min(lift, stride) < LEAST * sum(chain.lengths):
+        elif min(lift, stride) < MIN_MOTION * sum(chain.lengths):
             yield (f'{leg}: its foot moves by {1e3 * stride:.2g} mm forward and '
                    f'{1e3 * lift:.2g} mm upward only in the {gait.name}')
 
@@ -328,21 +328,21 @@ def _implausible(robot: Robot, known: RobotDescription) -> Iterator[str]:
     legs, what = _chains(robot, known), known.format
     longest = max((float(sum(chain.lengths)) for chain in legs.values()), default=0.0)
     for leg, chain in legs.items():
-        if sum(chain.lengths) > LONGEST_LEG:
+        if sum(chain.lengths) > MAX_LEG_LENGTH:
             k = int(np.argmax(chain.lengths))
             yield (f'{leg}: the link below {chain.joints[k]} is {chain.lengths[k]:.4g} m long in '
                    f'the {what}: are its lengths in mm?')
     mass = sum(link.mass for link in known.links.values())
-    if legs and mass > 0.0 and 0.0 < longest <= LONGEST_LEG:
+    if legs and mass > 0.0 and 0.0 < longest <= MAX_LEG_LENGTH:
         density = mass / longest**3
-        if not DENSITIES[0] <= density <= DENSITIES[1]:
+        if not DENSITY_RANGE[0] <= density <= DENSITY_RANGE[1]:
             yield (f'the {what} has a mass of {mass:.3g} kg with legs of {longest:.3g} m, which '
                    'no walking robot has')
 
 
 def _differing(stated: BodyGeometry, found: BodyGeometry, what: str) -> Iterator[str]:
     """Return where a robot file's geometry differs, in lines; ``what`` is the other's format."""
-    if found.mass > 0.0 and not 1.0 / MASS_RATIO <= stated.mass / found.mass <= MASS_RATIO:
+    if found.mass > 0.0 and not 1.0 / MAX_MASS_RATIO <= stated.mass / found.mass <= MAX_MASS_RATIO:
         yield f"geometry.mass {stated.mass:.4g} kg is not the {what}'s {found.mass:.4g} kg"
     for leg, own in stated.legs.items():
         other = found.legs.get(leg)
@@ -360,7 +360,7 @@ def _leg_faults(own: LegGeometry, other: LegGeometry, what: str) -> Iterator[str
                    f'{described:g}')
     for key in ('hip', 'thigh', 'calf', 'foot'):
         mine, theirs = np.array(getattr(own, key)), np.array(getattr(other, key))
-        room = LENGTH + LENGTH_SHARE * float(np.linalg.norm(theirs))
+        room = LENGTH_ATOL + LENGTH_RTOL * float(np.linalg.norm(theirs))
         if (off := float(np.linalg.norm(mine - theirs))) > room:
             yield f"{key}: {mine.tolist()} m is {off:.4g} m from the {what}'s {theirs.tolist()}"
 
@@ -373,16 +373,16 @@ def _faults(joint: Joint, description: RobotDescription, near: str) -> Iterator[
     if there.undrivable:
         yield f'cannot be driven, in the {what} it {there.undrivable}'
         return
-    if joint.lower < there.lower - ROUNDING:
+    if joint.lower < there.lower - LIMIT_TOLERANCE:
         yield (f'lower limit {joint.lower:g} rad is {there.lower - joint.lower:.4g} rad below the '
                f"{what}'s {there.lower:g}")
-    if joint.upper > there.upper + ROUNDING:
+    if joint.upper > there.upper + LIMIT_TOLERANCE:
         yield (f'upper limit {joint.upper:g} rad is {joint.upper - there.upper:.4g} rad above the '
                f"{what}'s {there.upper:g}")
-    if not there.lower - ROUNDING <= joint.offset <= there.upper + ROUNDING:
+    if not there.lower - LIMIT_TOLERANCE <= joint.offset <= there.upper + LIMIT_TOLERANCE:
         yield (f"offset {joint.offset:g} rad is outside the {what}'s limits {there.lower:g} to "
                f'{there.upper:g}: the robot could not stand')
-    if joint.velocity > there.velocity + ROUNDING:
+    if joint.velocity > there.velocity + LIMIT_TOLERANCE:
         yield (f'velocity limit {joint.velocity:g} rad/s is {joint.velocity - there.velocity:.4g} '
                f"rad/s above the {what}'s {there.velocity:g}")
 
@@ -420,7 +420,7 @@ def unlimited(robot: Robot) -> Robot:
 
 def _fastest(motion: Motion) -> float:
     steered = motion.steering.frequency if motion.steering else ()
-    return max(motion.frequency or 0.0, *steered, 0.0) or USUAL_FREQUENCY
+    return max(motion.frequency or 0.0, *steered, 0.0) or DEFAULT_FREQUENCY
 
 
 def _nearest(robot: Robot, described: RobotDescription) -> dict[str, str]:

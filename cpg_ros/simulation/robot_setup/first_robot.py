@@ -38,29 +38,29 @@ from cpg_ros.simulation.robot_setup.description_match import sole_up, unlimited
 import numpy as np
 from scipy.optimize import least_squares
 
-#: Height of the stand over the length of the stretched leg. UPRIGHT: on two legs, to the ankle;
-#: CROUCHED: on more.
-UPRIGHT, CROUCHED = 0.97, 0.765
-#: Angles in the stand of a leg that reaches to the side, rad. RAISED: femur above level; LOWERED:
-#: tibia below level.
-RAISED, LOWERED = 0.4, 1.3
-#: Initial amplitudes of feet over the height of the stand. SWING: forward; LIFTS: upward, on two
-#: legs and on more.
-SWING, LIFTS = 0.15, (0.02, 0.06)
-#: Limits of joints that have none. UNBOUNDED: of the angle, rad; SPEED: of the speed, rad/s.
-UNBOUNDED, SPEED = pi, 20.0
-#: MARGIN: least distance of the stand from a joint's limits, as a fraction of its range; USED:
-#: largest fraction of the room to the limits that gaits use.
-MARGIN, USED = 0.1, 0.8
-#: STARTS: poses from which a stand is searched; MIDDLE: weight of the distance from the middle of
-#: the joints' ranges; OTHER_WAY, STRAIGHT: price of a knee that is bent the unusual way or not.
-STARTS, MIDDLE, OTHER_WAY, STRAIGHT = 8, 1e-3, 0.3, 1.0
-#: NARROW: width of the ranges from which the first of them are drawn, rad.
-NARROW = 1.5
-#: NEAR: price of a stand up to which no other is searched.
-NEAR = 1e-5
-#: BENT: least distance of a bent knee from the line from hip to foot, over the leg's length.
-BENT = 0.03
+#: Height of the stand over the length of the stretched leg. BIPED_HEIGHT: on two legs, to the
+#: ankle; CROUCH_HEIGHT: on more.
+BIPED_HEIGHT, CROUCH_HEIGHT = 0.97, 0.765
+#: Angles in the stand of a leg that reaches to the side, rad. FEMUR_PITCH: femur above level;
+#: TIBIA_PITCH: tibia below level.
+FEMUR_PITCH, TIBIA_PITCH = 0.4, 1.3
+#: Initial amplitudes of feet over the height of the stand. SWING_AMPLITUDE: forward;
+#: LIFT_AMPLITUDES: upward, on two legs and on more.
+SWING_AMPLITUDE, LIFT_AMPLITUDES = 0.15, (0.02, 0.06)
+#: Limits of joints that have none. MAX_ANGLE: of the angle, rad; SPEED: of the speed, rad/s.
+MAX_ANGLE, SPEED = pi, 20.0
+#: LIMIT_MARGIN: least distance of the stand from a joint's limits, as a fraction of its range;
+#: MAX_USE: largest fraction of the room to the limits that gaits use.
+LIMIT_MARGIN, MAX_USE = 0.1, 0.8
+#: NUM_STARTS: poses from which a stand is searched; MIDDLE_WEIGHT: of the distance from the middle
+#: of the joints' ranges; REVERSED_COST, STRAIGHT_COST: of a knee bent the unusual way or not.
+NUM_STARTS, MIDDLE_WEIGHT, REVERSED_COST, STRAIGHT_COST = 8, 1e-3, 0.3, 1.0
+#: START_RANGE: width of the ranges from which the first of them are drawn, rad.
+START_RANGE = 1.5
+#: COST_TOLERANCE: price of a stand up to which no other is searched.
+COST_TOLERANCE = 1e-5
+#: MIN_BEND: least distance of a bent knee from the line from hip to foot, over the leg's length.
+MIN_BEND = 0.03
 
 
 def robot_from(known: RobotDescription, name: str, legs: Legs) -> tuple[Robot, str]:
@@ -108,7 +108,7 @@ def robot_from(known: RobotDescription, name: str, legs: Legs) -> tuple[Robot, s
 
 
 def _range(joint: JointDescription) -> tuple[float, float]:
-    lower, upper = max(joint.lower, -UNBOUNDED), min(joint.upper, UNBOUNDED)
+    lower, upper = max(joint.lower, -MAX_ANGLE), min(joint.upper, MAX_ANGLE)
     if upper - lower < 0.01:
         raise DescriptionError(f"the joint '{joint.name}' has no room to move: its limits are "
                                f'{joint.lower:g} to {joint.upper:g} rad')
@@ -146,10 +146,10 @@ class _StandingLeg:
         """Return a leg of a description; errors as of ``robot_from``."""
         chain = known.leg(legs[leg])
         low, high = np.array([_range(known.joints[name]) for name in chain.joints]).T
-        low, high = low + MARGIN * (high - low), high - MARGIN * (high - low)
+        low, high = low + LIMIT_MARGIN * (high - low), high - LIMIT_MARGIN * (high - low)
         axes, points, _ = chain.posed(0.5 * (low + high))
         pairs = [k for k in range(len(axes) - 1) if abs(axes[k] @ axes[k + 1]) > 0.99
-                 and np.linalg.norm(points[k + 1] - points[k]) > BENT * sum(chain.lengths)
+                 and np.linalg.norm(points[k + 1] - points[k]) > MIN_BEND * sum(chain.lengths)
                  and (k or abs(axes[k, 2]) < 0.7)]
         biped, count = len(legs) == 2, len(axes)
         if not pairs or (chain.lengths[-1] < 1e-3 and not biped):
@@ -166,8 +166,9 @@ class _StandingLeg:
             out = np.array([*outward(axes[bend], points[-1] - points[0]), 0.0])
             femur, tibia = (np.linalg.norm(points[b] - points[a])
                             for a, b in ((bend, bend + 1), (bend + 1, count)))
-            aside = points[bend] + femur * (np.cos(RAISED) * out + [0.0, 0.0, np.sin(RAISED)])
-            aside += tibia * (np.cos(LOWERED) * out - [0.0, 0.0, np.sin(LOWERED)])
+            aside = points[bend] + femur * (
+                np.cos(FEMUR_PITCH) * out + [0.0, 0.0, np.sin(FEMUR_PITCH)])
+            aside += tibia * (np.cos(TIBIA_PITCH) * out - [0.0, 0.0, np.sin(TIBIA_PITCH)])
         level = bend + 2 < count and aside is None
         if level:
             # The ankle, where it pitches: the last of the parallel joints.
@@ -183,7 +184,7 @@ class _StandingLeg:
     @property
     def height(self) -> float:
         """Height of the hip above the foot or ankle, m."""
-        return (UPRIGHT if self.biped else CROUCHED) * float(sum(
+        return (BIPED_HEIGHT if self.biped else CROUCH_HEIGHT) * float(sum(
             self.chain.lengths[self.top:self.end]))
 
     @property
@@ -198,14 +199,14 @@ class _StandingLeg:
         """Return the stand with the foot, or the ankle, at a height, rad, shape (joints,)."""
         middle, length = 0.5 * (self.low + self.high), float(sum(self.chain.lengths))
         wide = self.high - self.low
-        draws = np.random.default_rng(0).uniform(0.1, 0.9, (STARTS - 1, len(middle)))
+        draws = np.random.default_rng(0).uniform(0.1, 0.9, (NUM_STARTS - 1, len(middle)))
         # Of joints that turn almost anywhere, first a part of the range.
-        width = np.where(np.arange(STARTS - 1)[:, None] < STARTS // 2, np.minimum(wide, NARROW),
-                         wide)
+        width = np.where(np.arange(NUM_STARTS - 1)[:, None] < NUM_STARTS // 2,
+                         np.minimum(wide, START_RANGE), wide)
 
         def off(angles: np.ndarray) -> np.ndarray:
             axes, points, frame = self.chain.posed(angles)
-            rest = MIDDLE * (angles - middle) / wide
+            rest = MIDDLE_WEIGHT * (angles - middle) / wide
             if self.aside is not None:
                 return np.array([*(points[-1] - [*self.aside[:2], ground]) / length, *rest])
             down = (points[self.end] - points[self.top]) / length
@@ -215,7 +216,7 @@ class _StandingLeg:
 
         best, price = middle, inf
         for start in (middle, *(middle + (draws - 0.5) * width)):
-            if price > NEAR:
+            if price > COST_TOLERANCE:
                 solution = least_squares(off, start, bounds=(self.low, self.high), x_scale=wide)
                 if (cost := 2.0 * float(solution.cost) + self._way(solution.x)) < price:
                     best, price = solution.x, cost
@@ -231,8 +232,8 @@ class _StandingLeg:
         fractions = (knees[:, 2] - hip[2]) / min(foot[2] - hip[2], -1e-9)
         bulges = knees[:, 0] - hip[0] - fractions * (foot[0] - hip[0])
         bulge = float(bulges[np.abs(bulges).argmax()]) * (1.0 if self.biped else -1.0)
-        needed = BENT * float(sum(self.chain.lengths[self.top:self.end]))
-        return 0.0 if bulge > needed else OTHER_WAY if bulge < -needed else STRAIGHT
+        needed = MIN_BEND * float(sum(self.chain.lengths[self.top:self.end]))
+        return 0.0 if bulge > needed else REVERSED_COST if bulge < -needed else STRAIGHT_COST
 
     def steps(self, angles: np.ndarray, legs: int) -> tuple[list[tuple[float, ...]], list[str]]:
         """Return weights that swing the foot forward and up, rad, and the role of each joint."""
@@ -248,8 +249,8 @@ class _StandingLeg:
             task = np.column_stack([slopes[:, [0, 2]], axes[:, 1]])[moved].T[
                 :3 if self.sole is not None else 2]
         ways = np.zeros((len(task), 2))
-        ways[0, 0] = SWING * self.height
-        ways[2 if self.aside is not None else 1, 1] = LIFTS[legs > 2] * self.height
+        ways[0, 0] = SWING_AMPLITUDE * self.height
+        ways[2 if self.aside is not None else 1, 1] = LIFT_AMPLITUDES[legs > 2] * self.height
         turned = np.linalg.lstsq(task, ways, rcond=1e-3)[0]
         weights: list[tuple[float, ...]] = [(0.0,)] * len(angles)
         roles = ['holds still'] * len(angles)
@@ -271,7 +272,7 @@ def _fitting(robot: Robot) -> Robot:
             gait_plan = plan_gait(unlimited(robot), gait, 1.0, network=network)
             room = np.stack([offset - low, high - offset, fast])
             needed = np.stack([-gait_plan.span[0], gait_plan.span[1], gait_plan.speed])
-            fraction = min(fraction, float((USED * room / np.maximum(needed, 1e-9)).min()))
+            fraction = min(fraction, float((MAX_USE * room / np.maximum(needed, 1e-9)).min()))
     return replace(robot, legs={leg: tuple(replace(joint, weights=tuple(
         round(fraction * weight, 4) for weight in joint.weights))
         for joint in joints) for leg, joints in robot.legs.items()})

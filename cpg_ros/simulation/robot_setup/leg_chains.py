@@ -32,27 +32,26 @@ from cpg_ros.motion.description import (
 from cpg_ros.networks.leg_numbers import leg_names
 import numpy as np
 
-#: FACING: directions in which a robot may face, by quarter turns to the left of x.
-FACING = ('x', 'y', '-x', '-y')
-#: MIDDLE: distance from the middle of the body, as a fraction of the largest, up to which a joint
-#: is on it.
-MIDDLE = 0.05
-#: UNLIKE: largest difference in place or length between opposite legs, as a fraction of their
-#: length.
-UNLIKE = 0.2
-#: Largest differences from the lowest leg, as fractions of its length. SHORTER: height of a leg's
-#: end;
-#: HIGHER: height of its first joint.
-SHORTER, HIGHER = 0.35, 0.4
-#: CROSSWISE: ratio of axes along x to axes along y above which legs move along y; LEVEL: largest
-#: vertical component of an axis that is level.
-CROSSWISE, LEVEL = 1.3, 0.5
-#: FLAT: fraction of the axes' directions up to which they lie in a plane.
-FLAT = 0.05
-#: ENDLESS: range of a joint from which on it counts as unlimited, rad.
-ENDLESS = 100.0
-#: MOST_JOINTS: largest number of driven joints of a leg.
-MOST_JOINTS = 6
+#: DIRECTIONS: directions in which a robot may face, by quarter turns to the left of x.
+DIRECTIONS = ('x', 'y', '-x', '-y')
+#: MID_TOLERANCE: distance from the middle of the body, as a fraction of the largest, up to
+#: which a joint is on it.
+MID_TOLERANCE = 0.05
+#: MIRROR_TOLERANCE: largest difference in place or length between opposite legs, as a fraction of
+#: their length.
+MIRROR_TOLERANCE = 0.2
+#: Largest differences from the lowest leg, as fractions of its length. END_TOLERANCE: height of a
+#: leg's end; HIP_TOLERANCE: height of its first joint.
+END_TOLERANCE, HIP_TOLERANCE = 0.35, 0.4
+#: MIN_AXIS_RATIO: ratio of axes along x to axes along y above which legs move along y;
+#: MAX_VERTICAL: largest vertical component of an axis that is level.
+MIN_AXIS_RATIO, MAX_VERTICAL = 1.3, 0.5
+#: PLANE_TOLERANCE: fraction of the axes' directions up to which they lie in a plane.
+PLANE_TOLERANCE = 0.05
+#: UNLIMITED_RANGE: range of a joint from which on it counts as unlimited, rad.
+UNLIMITED_RANGE = 100.0
+#: MAX_LEG_JOINTS: largest number of driven joints of a leg.
+MAX_LEG_JOINTS = 6
 
 
 def legs_in(description: RobotDescription, faces_x: bool = False,
@@ -86,11 +85,11 @@ def legs_in(description: RobotDescription, faces_x: bool = False,
     if not fitting:
         raise LegsError(_contradiction(description, next(iter(by_quarter.values()))))
     if fitting[0]:
-        ways = ' or '.join(FACING[quarter] for quarter in fitting)
+        ways = ' or '.join(DIRECTIONS[quarter] for quarter in fitting)
         raise LegsError(
             f'the robot faces {ways} of the {description.format}, by '
             f"{'the axes of its legs' if crosswise else 'the names of its legs'}, and x is to be "
-            f'forward (REP 103): --forward={FACING[fitting[0]]} makes a URDF that is turned, '
+            f'forward (REP 103): --forward={DIRECTIONS[fitting[0]]} makes a URDF that is turned, '
             '--forward x takes x for forward')
     return _cleaned(description, by_quarter[fitting[0]])
 
@@ -116,11 +115,11 @@ def _crosswise(description: RobotDescription, legs: Iterable[Sequence[str]]) -> 
         first = next((k for k in range(len(axes) - 1) if abs(axes[k] @ axes[k + 1]) > 0.99), None)
         if first is None:
             across += np.abs(axes).sum(axis=0)
-        elif first and abs(axes[first - 1, 2]) < LEVEL:
+        elif first and abs(axes[first - 1, 2]) < MAX_VERTICAL:
             across += np.abs(np.cross((0.0, 0.0, 1.0), axes[first - 1]))
         elif not sprawls(axes[max(first - 1, 0):first + 2]):
             across += np.abs(axes[first])
-    return bool(across[0] > CROSSWISE * across[1])
+    return bool(across[0] > MIN_AXIS_RATIO * across[1])
 
 
 def _assigned(description: RobotDescription, paths: Sequence[Sequence[str]], quarter: int
@@ -130,7 +129,7 @@ def _assigned(description: RobotDescription, paths: Sequence[Sequence[str]], qua
     left = np.array([-ahead[1], ahead[0], 0.0])
     pairs = [pair for pair in _pairs(_limbs(description, paths, left), left) if all(
         limb_of(limb.joints) != 'other' and 1 < sum(
-            not description.joints[name].undrivable for name in limb.joints) <= MOST_JOINTS
+            not description.joints[name].undrivable for name in limb.joints) <= MAX_LEG_JOINTS
         for limb in pair)]
     legs = [pair for pair in pairs if not any(limb_of(limb.joints) == 'arm' for limb in pair)]
     if not legs and len(pairs) > 1:
@@ -140,8 +139,8 @@ def _assigned(description: RobotDescription, paths: Sequence[Sequence[str]], qua
         return {}
     lowest = min((pair[0] for pair in legs), key=_bottom)
     length = sum(lowest.lengths)
-    legs = [pair for pair in legs if _bottom(pair[0]) <= _bottom(lowest) + SHORTER * length
-            and pair[0].anchors[0, 2] <= lowest.anchors[0, 2] + HIGHER * length]
+    legs = [pair for pair in legs if _bottom(pair[0]) <= _bottom(lowest) + END_TOLERANCE * length
+            and pair[0].anchors[0, 2] <= lowest.anchors[0, 2] + HIP_TOLERANCE * length]
     legs.sort(key=lambda pair: float(pair[0].anchors[0] @ ahead))
     if len(legs) > 3 or (len(legs) == 1 and limb_of(legs[0][0].joints) == 'upper'):
         return {}
@@ -159,7 +158,7 @@ def _limbs(description: RobotDescription, paths: Sequence[Sequence[str]], left: 
     """Return the longest chain of each part of the body that begins off the middle plane."""
     aside = {name: abs(float(description.frame(name)[0] @ left)) for path in paths
              for name in path}
-    middle = max(MIDDLE * max(aside.values(), default=0.0), 1e-6)
+    middle = max(MID_TOLERANCE * max(aside.values(), default=0.0), 1e-6)
     limbs: dict[str, LegChain] = {}
     for path in paths:
         joints = path[next((k for k, name in enumerate(path) if aside[name] > middle), len(path)):]
@@ -181,8 +180,8 @@ def _pairs(limbs: Sequence[LegChain], left: np.ndarray) -> list[tuple[LegChain, 
         nearest = min(free, key=lambda other: float(np.linalg.norm(other.anchors[0] - mirrored)))
         # Between joints: the meshes of feet may be missing on one side.
         unlike = abs(float(sum(limb.lengths[:-1]) - sum(nearest.lengths[:-1])))
-        if max(float(np.linalg.norm(nearest.anchors[0] - mirrored)), unlike) <= UNLIKE * max(
-                float(sum(one.lengths)) for one in (limb, nearest)):
+        if max(float(np.linalg.norm(nearest.anchors[0] - mirrored)), unlike
+               ) <= MIRROR_TOLERANCE * max(float(sum(one.lengths)) for one in (limb, nearest)):
             pairs.append((limb, nearest))
             free.remove(nearest)
     return pairs
@@ -193,7 +192,7 @@ def _question(description: RobotDescription, paths: Sequence[Sequence[str]]) -> 
     axes = np.array([description.direction(name) for path in paths for name in path
                      if description.joints[name].kind in TURNING]).reshape(-1, 3)
     spread, ways = np.linalg.eigh(axes.T @ axes / max(len(axes), 1))
-    if len(paths) > 3 and spread[0] < FLAT < spread[1] and abs(ways[2, 0]) < FLAT:
+    if len(paths) > 3 and max(spread[0], abs(ways[2, 0])) < PLANE_TOLERANCE < spread[1]:
         # Legs roll and pitch about level axes, and what is across both is up.
         return ('no legs are found: the axes of the joints say that '
                 f'{"xyz"[int(np.abs(ways[:, 0]).argmax())]} is up, and z is to be (REP 103): turn '
@@ -202,9 +201,9 @@ def _question(description: RobotDescription, paths: Sequence[Sequence[str]]) -> 
     why = ('no legs are found: no two limbs of two to six joints that reach down are mirror '
            'images of each other')
     lowest = min(limbs, key=_bottom, default=None)
-    if lowest is not None and len(lowest.joints) > MOST_JOINTS:
+    if lowest is not None and len(lowest.joints) > MAX_LEG_JOINTS:
         why += f' (the lowest limb, from {lowest.joints[0]} on, has {len(lowest.joints)})'
-    limbs = sorted((limb for limb in limbs if 1 < len(limb.joints) <= MOST_JOINTS),
+    limbs = sorted((limb for limb in limbs if 1 < len(limb.joints) <= MAX_LEG_JOINTS),
                    key=lambda limb: float(limb.anchors[0, 0]))
     left, right = ([limb for limb in limbs if sign * limb.anchors[0, 1] > 0.0]
                    for sign in (1.0, -1.0))
@@ -302,7 +301,7 @@ def _held(description: RobotDescription, leg: Sequence[str], name: str) -> str:
 def _wheel(description: RobotDescription, leg: Sequence[str], joint: JointDescription) -> bool:
     """Return whether a joint is a wheel: unlimited, below two limited, parallel to the last."""
     before = [name for name in leg[:-1] if description.joints[name].kind == 'revolute']
-    endless = joint.kind == 'continuous' or joint.upper - joint.lower > ENDLESS
+    endless = joint.kind == 'continuous' or joint.upper - joint.lower > UNLIMITED_RANGE
     if not endless or joint.name != leg[-1] or len(before) < 2:
         return False
     return bool(abs(description.direction(joint.name) @ description.direction(before[-1])) > 0.7)

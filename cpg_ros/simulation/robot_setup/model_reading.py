@@ -180,19 +180,19 @@ def _limits(mujoco: Any, model: Any, k: int) -> tuple[float, float, float]:
     return float(lower), float(upper), float(velocity)
 
 
-#: Servos. STIFF: stiffness over their largest torque, 1/rad, at most STIFFEST, N m/rad, for a
-#: robot of the G1's size; DAMPED: damping over stiffness, s; LIGHT: factor of the damping of
-#: joints next to a sole, whose links are light.
-STIFF, STIFFEST, DAMPED, LIGHT = 1.0, 100.0, 0.05, 0.4
-#: HEIGHT: of the G1's centre of mass in a walk, m; MASS: of the G1, kg.
-HEIGHT, MASS = 0.6657, 33.34
-#: LEVER: largest torque over the robot's weight, m, where the model has no limit.
-LEVER = 0.3
-#: FLAT: height above a sole's lowest point up to which points belong to the sole, m.
-FLAT = 0.01
-#: CROUCH: by how much the centre of mass is lower in a walk than in the stand, m, so that legs
-#: reach.
-CROUCH = 0.01
+#: Servos. KP_RATIO: stiffness over their largest torque, 1/rad, at most MAX_KP, N m/rad, for a
+#: robot of the G1's size; KD_RATIO: damping over stiffness, s; FOOT_KD_RATIO: factor of the
+#: damping of joints next to a sole, whose links are light.
+KP_RATIO, MAX_KP, KD_RATIO, FOOT_KD_RATIO = 1.0, 100.0, 0.05, 0.4
+#: G1_HEIGHT: of the G1's centre of mass in a walk, m; G1_MASS: of the G1, kg.
+G1_HEIGHT, G1_MASS = 0.6657, 33.34
+#: TORQUE_ARM: largest torque over the robot's weight, m, where the model has no limit.
+TORQUE_ARM = 0.3
+#: SOLE_THICKNESS: height above a sole's lowest point up to which points belong to the sole, m.
+SOLE_THICKNESS = 0.01
+#: CROUCH_DEPTH: by how much the centre of mass is lower in a walk than in the stand, m, so that
+#: legs reach.
+CROUCH_DEPTH = 0.01
 
 
 def read_biped(name: str, robot: Robot) -> BipedBody:
@@ -233,7 +233,7 @@ def read_biped(name: str, robot: Robot) -> BipedBody:
         before = model.dof_jntid[model.dof_parentid[model.jnt_dofadr[k]]]
         parent = BASE if before == free else model.joint(before).name
         effort = (float(model.jnt_actfrcrange[k, 1]) if model.jnt_actfrclimited[k]
-                  else round(LEVER * weight))
+                  else round(TORQUE_ARM * weight))
         angle = None if joint in driven else float(np.clip(0.0, *_range(model, k)))
         links[joint] = BipedLink(
             parent, _rounded(data.xaxis[k]), _rounded(anchor), heavy, _rounded(middle),
@@ -258,14 +258,14 @@ def _fitted(body: BipedBody, robot: Robot) -> BipedBody:
     kinematics(links, np.zeros(3), angles, (np.zeros(3), np.zeros(count)), pose, center,
                np.zeros((2, 6)), np.zeros(count))
     wide = abs(float(pose.soles[0, 1] - pose.soles[1, 1]))
-    height = float(center[2] - pose.soles[:, 2].mean()) - CROUCH
-    length, mass = round(height / HEIGHT, 3), round(body.total / MASS, 3)
-    stiffest = STIFFEST * length * mass
+    height = float(center[2] - pose.soles[:, 2].mean()) - CROUCH_DEPTH
+    length, mass = round(height / G1_HEIGHT, 3), round(body.total / G1_MASS, 3)
+    stiffest = MAX_KP * length * mass
     light = {joint for leg in links.chains for joint in np.array(list(body.links))[leg[-2:] - 1]}
     servos = {}
     for name, link in body.links.items():
-        damped = DAMPED * math.sqrt(length) * (LIGHT if name in light else 1.0)
-        servos[name] = replace(link, kp=round(min(STIFF * link.effort, stiffest), 3),
+        damped = KD_RATIO * math.sqrt(length) * (FOOT_KD_RATIO if name in light else 1.0)
+        servos[name] = replace(link, kp=round(min(KP_RATIO * link.effort, stiffest), 3),
                                kd=round(damped * min(link.effort, stiffest), 3))
     return replace(body, links=servos, scale=(length, mass),
                    gains={'height': round(height, 4), 'step_width': round(wide, 4)})
@@ -301,6 +301,6 @@ def _sole(model: Any, data: Any, bodies: list[int], leg: str) -> tuple[np.ndarra
                               'are missing, install their package or give feet a <collision>')
     cloud = np.concatenate(points)
     lowest = cloud[:, 2].min()
-    flat = cloud[cloud[:, 2] < lowest + FLAT]
+    flat = cloud[cloud[:, 2] < lowest + SOLE_THICKNESS]
     low, high = flat.min(axis=0), flat.max(axis=0)
     return np.array([*(0.5 * (low + high))[:2], lowest]), (high - low)[:2]

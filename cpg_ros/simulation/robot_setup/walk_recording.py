@@ -34,9 +34,9 @@ import numpy as np
 
 # Measurement of a gait's efference copy: the body's motion on flat ground without feedback.
 
-#: DURATION: of a run, s; BEGINNING: first part of it that is ignored, s; FRICTIONS: of the grounds
-#: over which the motion is averaged.
-DURATION, BEGINNING, FRICTIONS = 10.0, 3.0, (0.6, 0.8, 1.0)
+#: DURATION: of a run, s; SETTLING_TIME: first part of it that is ignored, s; FRICTIONS: of the
+#: grounds over which the motion is averaged.
+DURATION, SETTLING_TIME, FRICTIONS = 10.0, 3.0, (0.6, 0.8, 1.0)
 
 
 def measure_efference(loop: ClosedLoopBatch,
@@ -62,7 +62,7 @@ def measure_efference(loop: ClosedLoopBatch,
     if not upright.any():
         raise InputError(f"'{loop.plan.name}' has no efference copy: without feedback the robot "
                          'falls at each of its speeds')
-    first = round(BEGINNING / loop.timestep)
+    first = round(SETTLING_TIME / loop.timestep)
     # The velocity is the robot's own estimate: an error that it makes at every stride is no
     # disturbance.
     signals = np.concatenate([ran.estimated[:, :, :2], ran.angular_velocity[:, :, :2],
@@ -108,8 +108,8 @@ def calibrated(robot: Robot, model: str, gaits: Sequence[str],
     return replace(robot, motions=motions)
 
 
-#: TYPES: key of a topic that is read -> its type.
-TYPES = {'joint_states': 'sensor_msgs/msg/JointState', 'imu': 'sensor_msgs/msg/Imu',
+#: TOPIC_TYPES: key of a topic that is read -> its type.
+TOPIC_TYPES = {'joint_states': 'sensor_msgs/msg/JointState', 'imu': 'sensor_msgs/msg/Imu',
          'foot_contacts': 'std_msgs/msg/Float64MultiArray',
          'phase': 'std_msgs/msg/Float64MultiArray'}
 #: OPTIONAL: keys of topics that a bag may lack.
@@ -149,7 +149,7 @@ def read_walk(path: str | Path, robot: Robot, topics: Mapping[str, str]) -> Walk
     Args:
         path: the bag.
         robot: with the joints and legs to read.
-        topics: their names, by the keys of TYPES.
+        topics: their names, by the keys of TOPIC_TYPES.
 
     Raises:
         RecordingError: the bag or a message cannot be read, a topic is missing or of another type,
@@ -166,7 +166,7 @@ def read_walk(path: str | Path, robot: Robot, topics: Mapping[str, str]) -> Walk
     with opened(path) as bag:
         kinds = {connection.topic: connection.msgtype for connection in bag.connections}
         dogs = [topic for topic, kind in kinds.items() if kind == LOW_STATE]
-        if dogs and kinds.get(names['joint_states']) != TYPES['joint_states']:
+        if dogs and kinds.get(names['joint_states']) != TOPIC_TYPES['joint_states']:
             given, counts = names['joint_states'], bag.expected()
             return _of_low_states(path, robot, [
                 (received, data) for _, received, data in bag.messages(
@@ -174,16 +174,16 @@ def read_walk(path: str | Path, robot: Robot, topics: Mapping[str, str]) -> Walk
         for key, topic in list(names.items()):
             if key in OPTIONAL and topic not in kinds:
                 del names[key]
-            elif kinds.get(topic) != TYPES[key]:
+            elif kinds.get(topic) != TOPIC_TYPES[key]:
                 there = ', '.join(f'{name} ({kind})' for name, kind in list(kinds.items())[:8])
-                raise RecordingError(f'{path}: no topic {topic} of type {TYPES[key]} (--'
+                raise RecordingError(f'{path}: no topic {topic} of type {TOPIC_TYPES[key]} (--'
                                      f'{key.replace("_", "-")}); it has {there or "none"}')
         key_of = {topic: key for key, topic in names.items()}
         by_key: dict[str, list[tuple[int, Any]]] = {key: [] for key in names}
         for topic, received, data in bag.messages(list(names.values())):
             key = key_of[topic]
             try:
-                by_key[key].append((received, TYPESTORE.deserialize_cdr(data, TYPES[key])))
+                by_key[key].append((received, TYPESTORE.deserialize_cdr(data, TOPIC_TYPES[key])))
             except SerdeError as error:
                 raise RecordingError(f'{path}, {topic}: a message cannot be read: {error}'
                                      ) from error

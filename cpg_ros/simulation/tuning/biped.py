@@ -36,29 +36,29 @@ from cpg_ros.simulation.terrain import Terrain
 from cpg_ros.simulation.tuning.gaits import cma_search, scaled_gains, Survivors
 import numpy as np
 
-#: SEARCHED: names of the gains that are searched for.
-SEARCHED = ('frequency', 'step_width', 'place_x', 'place_y', 'place_offset', 'speed_up',
+#: GAIN_NAMES: names of the gains that are searched for.
+GAIN_NAMES = ('frequency', 'step_width', 'place_x', 'place_y', 'place_offset', 'speed_up',
             'speed_up_from', 'cop_x', 'cop_y', 'height_kp', 'height_kd', 'roll_kp',
             'roll_kd', 'pitch_kp', 'pitch_kd', 'yaw_kp', 'yaw_kd', 'stance_damping', 'lean',
             'lift', 'swing_kp', 'swing_kd', 'sole_kp', 'sole_kd', 'reaction_yaw')
-#: FACTOR: largest factor by which a gain changes, either way; SPREAD: initial standard deviation
-#: of the gains' logarithms; DIGITS: digits of gains in a file.
-FACTOR, SPREAD, DIGITS = 3.0, 0.15, 4
-#: TOGETHER: designs of a job; BATCH: walks of a job that judges.
-TOGETHER, BATCH = 3, 8
-#: PUSHES: number of pushes of each impulse; IMPULSES: as fractions of m sqrt(g h); SPEEDS, m/s,
-#: and TILES, height of tiles, m: for a robot of the G1's size.
-PUSHES, IMPULSES, SPEEDS, TILES = 3, (0.12, 0.2, 0.28), (0.0, 0.3, 0.5), 0.03
+#: MAX_FACTOR: largest factor by which a gain changes, either way; INITIAL_SIGMA: initial standard
+#: deviation of the gains' logarithms; DIGITS: digits of gains in a file.
+MAX_FACTOR, INITIAL_SIGMA, DIGITS = 3.0, 0.15, 4
+#: DESIGNS_PER_JOB: designs of a job; WALKS_PER_JOB: walks of a job that judges.
+DESIGNS_PER_JOB, WALKS_PER_JOB = 3, 8
+#: NUM_PUSHES: number of pushes of each impulse; IMPULSES: as fractions of m sqrt(g h); SPEEDS,
+#: m/s, and TILE_HEIGHT, height of tiles, m: for a robot of the G1's size.
+NUM_PUSHES, IMPULSES, SPEEDS, TILE_HEIGHT = 3, (0.12, 0.2, 0.28), (0.0, 0.3, 0.5), 0.03
 #: Sensors as those of a real robot: late, in s, and noisy.
 NOISE = SensorNoise(delay=0.004, gyroscope_noise=0.02, accelerometer_noise=0.1, force_noise=0.05)
-#: Times of a run, s. WALKS_OFF: start of the walk; PUSHED: earliest push, which comes within
-#: STRIDE after it; END: end of the run.
-WALKS_OFF, PUSHED, STRIDE, END = 1.0, 5.0, 0.6, 9.0
-#: Prices beside that of a fall. SPEED: of a relative error of the speed; TILT: of a tilt, 1/rad.
-SPEED, TILT = 0.5, 0.5
-#: Judgement of the result. JUDGED: pushes of each impulse; WALKED: walks of each speed; FRESH:
-#: seed.
-JUDGED, WALKED, FRESH = 24, 5, 10_000_019
+#: Times of a run, s. START_TIME: start of the walk; PUSH_TIME: earliest push, which comes within
+#: STRIDE_PERIOD after it; DURATION: end of the run.
+START_TIME, PUSH_TIME, STRIDE_PERIOD, DURATION = 1.0, 5.0, 0.6, 9.0
+#: Prices beside that of a fall: of a relative error of the speed, and of a tilt, 1/rad.
+SPEED_WEIGHT, TILT_WEIGHT = 0.5, 0.5
+#: Judgement of the result. NUM_TEST_PUSHES: pushes of each impulse; NUM_TEST_WALKS: walks of each
+#: speed; TEST_SEED: seed.
+NUM_TEST_PUSHES, NUM_TEST_WALKS, TEST_SEED = 24, 5, 10_000_019
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ def walked(job: WalkJob) -> list[list[BipedOutcome]]:
     for gains in job.candidates:
         robot = with_gains(job.robot, gains)
         outcomes.append([runs[walk.ground].run(
-            END, ((WALKS_OFF, walk.speed, 0.0, 0.0),), (walk.push,) if walk.push else (),
+            DURATION, ((START_TIME, walk.speed, 0.0, 0.0),), (walk.push,) if walk.push else (),
             BipedFeedback(robot), walk.seed) for walk in job.walks])
     return outcomes
 
@@ -165,21 +165,21 @@ def tune_biped(robot: Robot, model: str, evaluations: int, seed: int, *,
 
     def changed(logs: np.ndarray) -> dict[str, float]:
         return {name: float(f'{gain:.{DIGITS}g}')
-                for name, gain in scaled_gains(usual, SEARCHED, logs, GAINS).items()}
+                for name, gain in scaled_gains(usual, GAIN_NAMES, logs, GAINS).items()}
 
     def price(logs: Sequence[np.ndarray], draw: int) -> list[float]:
-        walks = _walks(robot, draw, PUSHES, 1)
-        jobs = [WalkJob(robot, model, [*map(changed, logs[k:k + TOGETHER])], walks)
-                for k in range(0, len(logs), TOGETHER)]
+        walks = _walks(robot, draw, NUM_PUSHES, 1)
+        jobs = [WalkJob(robot, model, [*map(changed, logs[k:k + DESIGNS_PER_JOB])], walks)
+                for k in range(0, len(logs), DESIGNS_PER_JOB)]
         return [_price(walks, outcomes) for part in compute(walked, jobs) for outcomes in part]
 
-    most = math.log(FACTOR)
-    result, _ = cma_search(np.zeros(len(SEARCHED)), SPREAD, (-most, most), seed, price,
+    most = math.log(MAX_FACTOR)
+    result, _ = cma_search(np.zeros(len(GAIN_NAMES)), INITIAL_SIGMA, (-most, most), seed, price,
                            evaluations, update)
     gains = changed(result.xfavorite)
-    fresh = _walks(robot, FRESH + seed, JUDGED, WALKED)
-    jobs = [WalkJob(robot, model, [{}, gains], fresh[k:k + BATCH])
-            for k in range(0, len(fresh), BATCH)]
+    fresh = _walks(robot, TEST_SEED + seed, NUM_TEST_PUSHES, NUM_TEST_WALKS)
+    jobs = [WalkJob(robot, model, [{}, gains], fresh[k:k + WALKS_PER_JOB])
+            for k in range(0, len(fresh), WALKS_PER_JOB)]
     parts = [*compute(walked, jobs)]
     tuned = _compared(fresh,
                       [[outcome for part in parts for outcome in part[k]] for k in range(2)])
@@ -204,12 +204,12 @@ def _walks(robot: Robot, seed: int, pushes: int, walks: int) -> list[Walk]:
         for _ in range(pushes):
             angle, size = rng.uniform(0.0, 2.0 * math.pi), fraction * mass * math.sqrt(
                 GRAVITY * height)
-            push = impulse(PUSHED + pace * rng.uniform(0.0, STRIDE), size * math.cos(angle),
-                           size * math.sin(angle))
+            push = impulse(PUSH_TIME + pace * rng.uniform(0.0, STRIDE_PERIOD),
+                           size * math.cos(angle), size * math.sin(angle))
             result.append(Walk(pace * SPEEDS[1], int(rng.integers(2**31)), push))
     for _ in range(walks):
         result += [Walk(pace * speed, int(rng.integers(2**31))) for speed in SPEEDS]
-        result.append(Walk(pace * SPEEDS[1], int(rng.integers(2**31)), None, length * TILES))
+        result.append(Walk(pace * SPEEDS[1], int(rng.integers(2**31)), None, length * TILE_HEIGHT))
     return result
 
 
@@ -221,12 +221,12 @@ def _price(walks: Sequence[Walk], outcomes: Sequence[BipedOutcome]) -> float:
     price = 0.0
     for walk, outcome in zip(walks, outcomes, strict=True):
         if math.isfinite(outcome.fell):
-            price += 2.0 - outcome.fell / END + SPEED
+            price += 2.0 - outcome.fell / DURATION + SPEED_WEIGHT
             continue
-        price += TILT * outcome.tilt
+        price += TILT_WEIGHT * outcome.tilt
         if walk.push is None:
             scale = max(abs(walk.speed), SPEEDS[1])
-            price += SPEED * min(math.hypot(outcome.speed[0] - walk.speed,
+            price += SPEED_WEIGHT * min(math.hypot(outcome.speed[0] - walk.speed,
                                             outcome.speed[1]) / scale, 1.0)
     return price / len(walks)
 

@@ -48,23 +48,23 @@ from scipy.stats import binomtest
 
 #: BENEFIT_IMPULSES: impulses of pushes, as fractions of m sqrt(g l) with the legs' length l.
 BENEFIT_IMPULSES = (0.2, 0.4, 0.6)
-#: BENEFIT_PUSHES: number of pushes of each impulse; UNDISTURBED: number of undisturbed runs;
-#: WALKED: duration of these, s; PUSHED: earliest time of a push, s; WATCHED: time observed after,
-#: s.
-BENEFIT_PUSHES, UNDISTURBED, WALKED = 8, 4, 5.0
-PUSHED, WATCHED = 1.6, 3.4
-#: FROUDE: v / sqrt(g l) of the commanded speed; FRACTION: the largest commanded speed, as a
-#: fraction of the fastest one.
-FROUDE, FRACTION = 0.2, 0.8
+#: NUM_BENEFIT_PUSHES: number of pushes of each impulse; NUM_CALM: number of undisturbed
+#: runs; WALK_DURATION: duration of these, s; PUSH_TIME: earliest time of a push, s;
+#: TRIAL_DURATION: time observed after, s.
+NUM_BENEFIT_PUSHES, NUM_CALM, WALK_DURATION = 8, 4, 5.0
+PUSH_TIME, TRIAL_DURATION = 1.6, 3.4
+#: FROUDE_NUMBER: v / sqrt(g l) of the commanded speed; MAX_SPEED_FRACTION: the largest commanded
+#: speed, as a fraction of the fastest one.
+FROUDE_NUMBER, MAX_SPEED_FRACTION = 0.2, 0.8
 #: DELAYS: of the sensors, s, by turns from run to run, in proportion to sqrt(l) less for legs
 #: shorter than a Go2's; SENSORS: their other errors.
 DELAYS = (0.01, 0.02)
 SENSORS = SensorNoise(force_bias=0.2, force_noise=0.2, orientation_bias=0.01,
                       gyroscope_noise=0.02, gyroscope_bias=0.01, accelerometer_noise=0.3,
                       accelerometer_bias=0.1)
-#: WITHOUT: sets of laws that are switched off, one after another, until feedback helps: reflexes
+#: LAWS_OFF: sets of laws that are switched off, one after another, until feedback helps: reflexes
 #: and posture may harm robots with slow joints or feet that drag.
-WITHOUT: Sequence[tuple[str, ...]] = ((), ('reflexes',), ('reflexes', 'posture'))
+LAWS_OFF: Sequence[tuple[str, ...]] = ((), ('reflexes',), ('reflexes', 'posture'))
 
 
 @dataclass(frozen=True)
@@ -141,9 +141,9 @@ class FeedbackTrial:
         plan = plan_gait(robot, gait)
         self.loop = ClosedLoopBatch(model, plan, kp=kp, kd=kd)
         self.length = leg_length(self.loop.geometry)
-        self.speed = FROUDE * math.sqrt(GRAVITY * self.length)
+        self.speed = FROUDE_NUMBER * math.sqrt(GRAVITY * self.length)
         if plan.motion.steering is not None:
-            self.speed = min(self.speed, FRACTION * plan.speeds[1])
+            self.speed = min(self.speed, MAX_SPEED_FRACTION * plan.speeds[1])
 
     @property
     def delays(self) -> list[float]:
@@ -160,21 +160,21 @@ class FeedbackTrial:
             for k in range(count):
                 way = first + 2.0 * math.pi * k / count
                 pushes.append(Scenario(speed=self.speed, phase=rng.uniform(), pushes=(
-                    impulse(PUSHED, fraction * unit * math.cos(way),
+                    impulse(PUSH_TIME, fraction * unit * math.cos(way),
                             fraction * unit * math.sin(way)),)))
         return pushes
 
     def calm(self) -> list[Scenario]:
         """Return undisturbed runs."""
-        return [Scenario(speed=self.speed, phase=k / UNDISTURBED) for k in range(UNDISTURBED)]
+        return [Scenario(speed=self.speed, phase=k / NUM_CALM) for k in range(NUM_CALM)]
 
     def survived(self, gains: Gains | None, pushed: Sequence[Scenario]) -> np.ndarray:
         """Return which runs with pushes are survived; None runs them without feedback."""
-        return np.isinf(self._fell(gains, pushed, WATCHED))
+        return np.isinf(self._fell(gains, pushed, TRIAL_DURATION))
 
     def fell(self, gains: Gains | None) -> np.ndarray:
-        """Return when undisturbed runs fell, s, infinite without a fall, shape (UNDISTURBED,)."""
-        return self._fell(gains, self.calm(), WALKED)
+        """Return when undisturbed runs fell, s, infinite without a fall, shape (NUM_CALM,)."""
+        return self._fell(gains, self.calm(), WALK_DURATION)
 
     def _fell(self, gains: Gains | None, scenarios: Sequence[Scenario], duration: float
               ) -> np.ndarray:
@@ -191,7 +191,7 @@ def evaluate_feedback(robot: Robot, model: str, gaits: Sequence[str], kp: float 
                    kd: float | None = None, seed: int = 0) -> tuple[Robot, list[Benefit]]:
     """Return a robot whose file states whether its feedback helps in gaits, and the evidence.
 
-    It gets the first set of laws in WITHOUT that helps in every gait; if none does, its feedback
+    It gets the first set of laws in LAWS_OFF that helps in every gait; if none does, its feedback
     is off by default. Laws and gains of its own stay.
 
     Args:
@@ -208,12 +208,12 @@ def evaluate_feedback(robot: Robot, model: str, gaits: Sequence[str], kp: float 
     """
     own = robot.feedback or OwnFeedback()
     trials = {gait: FeedbackTrial(robot, model, gait, kp, kd) for gait in gaits}
-    pushed = {gait: trial.pushed(np.random.default_rng(seed), BENEFIT_PUSHES, BENEFIT_IMPULSES)
+    pushed = {gait: trial.pushed(np.random.default_rng(seed), NUM_BENEFIT_PUSHES, BENEFIT_IMPULSES)
               for gait, trial in trials.items()}
     before = {gait: (trial.fell(None), trial.survived(None, pushed[gait]))
               for gait, trial in trials.items()}
     first: list[Benefit] = []
-    for without in WITHOUT:
+    for without in LAWS_OFF:
         tried = replace(own, enabled=True, laws={**own.laws, **dict.fromkeys(without, False)})
         gains, benefits = robot_gains(replace(robot, feedback=tried)), []
         for gait, trial in trials.items():
@@ -235,29 +235,29 @@ def _text(benefits: Sequence[Benefit]) -> str:
     return 'in simulation, ' + '; '.join(map(str, benefits))
 
 
-#: SEARCHED: law -> its gains that are searched for.
-SEARCHED = {
+#: GAIN_NAMES: law -> its gains that are searched for.
+GAIN_NAMES = {
     'posture': ('roll', 'roll_rate', 'pitch', 'pitch_rate'),
     'placement': ('step', 'step_left', 'step_pitch_rate', 'step_most', 'give_left'),
     'pace': ('pace_from', 'pace_gain', 'pace_most', 'pace_fatigue'),
     'reflexes': ('lift', 'reach_rate', 'reach_most'),
     'slope': ('slope_share',), 'speed': ('speed_share', 'speed_rate')}
-#: FACTOR: largest factor by which a gain changes, either way; SPREAD: initial standard deviation
-#: of the gains' logarithms.
-FACTOR, SPREAD = 8.0, 0.35
-#: TOGETHER: designs of a job; PUSHES: number of pushes of each impulse; FIELDS: number of fields
-#: of rough ground.
-TOGETHER, PUSHES, FIELDS = 3, 8, 3
+#: MAX_FACTOR: largest factor by which a gain changes, either way; INITIAL_SIGMA: initial standard
+#: deviation of the gains' logarithms.
+MAX_FACTOR, INITIAL_SIGMA = 8.0, 0.35
+#: BATCH_SIZE: designs of a job; NUM_PUSHES: number of pushes of each impulse; NUM_FIELDS:
+#: number of fields of rough ground.
+BATCH_SIZE, NUM_PUSHES, NUM_FIELDS = 3, 8, 3
 #: IMPULSES: of pushes, as fractions of m sqrt(g l); harder than most robots survive.
 IMPULSES = (0.6, 1.0, 1.4)
-#: ROUGH: height of the fields, as a fraction of the legs' length.
-ROUGH = 0.12
-#: Weights of a price. PUSH, CALM, GROUND: of the fraction of falls after pushes, undisturbed and
-#: on rough ground; SPEED: of the relative error of the speed; COST: of the relative rise of the
-#: cost of transport by feedback.
-PUSH, CALM, GROUND, SPEED, COST = 1.0, 1.0, 0.5, 0.5, 0.1
-#: JUDGED: pushes of each impulse that judge the result; FRESH: seed that draws them.
-JUDGED, FRESH = 64, 10_000_019
+#: FIELD_HEIGHT: height of the fields, as a fraction of the legs' length.
+FIELD_HEIGHT = 0.12
+#: Weights of a price. PUSH_WEIGHT, CALM_WEIGHT, GROUND_WEIGHT: of the fraction of falls after
+#: pushes, undisturbed and on rough ground; SPEED_WEIGHT: of the relative error of the speed;
+#: COST_WEIGHT: of the relative rise of the cost of transport by feedback.
+PUSH_WEIGHT, CALM_WEIGHT, GROUND_WEIGHT, SPEED_WEIGHT, COST_WEIGHT = 1.0, 1.0, 0.5, 0.5, 0.1
+#: NUM_TEST_PUSHES: pushes of each impulse that judge the result; TEST_SEED: seed that draws them.
+NUM_TEST_PUSHES, TEST_SEED = 64, 10_000_019
 
 
 @dataclass(frozen=True)
@@ -289,19 +289,21 @@ def prices(job: PriceJob) -> list[float]:
     for gait, cost in zip(job.gaits, job.costs, strict=True):
         trial = FeedbackTrial(job.robot, job.model, gait, job.kp, job.kd)
         rng = np.random.default_rng(job.seed)
-        pushed, calm = trial.pushed(rng, PUSHES, IMPULSES), trial.calm()
+        pushed, calm = trial.pushed(rng, NUM_PUSHES, IMPULSES), trial.calm()
         rough = [Scenario(speed=trial.speed, terrain=Terrain(
-            'height_field', ROUGH * trial.length, int(rng.integers(2**31))))
-            for _ in range(FIELDS)]
+            'height_field', FIELD_HEIGHT * trial.length, int(rng.integers(2**31))))
+            for _ in range(NUM_FIELDS)]
         for k, gains in enumerate(job.candidates):
-            after = trial.loop.run(pushed, WATCHED, gains)
-            walked = trial.loop.run([*calm, *rough], WALKED, gains)
-            late = walked.velocity[:UNDISTURBED, walked.velocity.shape[1] // 2:, 0].mean(axis=1)
+            after = trial.loop.run(pushed, TRIAL_DURATION, gains)
+            walked = trial.loop.run([*calm, *rough], WALK_DURATION, gains)
+            late = walked.velocity[:NUM_CALM, walked.velocity.shape[1] // 2:, 0].mean(axis=1)
             error = np.minimum(np.abs(late / trial.speed - 1.0), 1.0).mean()
-            dearer = np.clip(walked.cost[:UNDISTURBED] / cost - 1.0, 0.0, 10.0).mean()
+            cost_rise = np.clip(walked.cost[:NUM_CALM] / cost - 1.0, 0.0, 10.0).mean()
             falls = ~walked.upright
-            prices[k] += (PUSH * (~after.upright).mean() + CALM * falls[:UNDISTURBED].mean()
-                         + GROUND * falls[UNDISTURBED:].mean() + SPEED * error + COST * dearer)
+            prices[k] += (PUSH_WEIGHT * (~after.upright).mean()
+                          + CALM_WEIGHT * falls[:NUM_CALM].mean()
+                          + GROUND_WEIGHT * falls[NUM_CALM:].mean()
+                          + SPEED_WEIGHT * error + COST_WEIGHT * cost_rise)
     return (prices / len(job.gaits)).tolist()
 
 
@@ -363,27 +365,28 @@ def tune_feedback(robot: Robot, model: str, gaits: Sequence[str], evaluations: i
     # Report a missing library before anything is simulated.
     cma_es()
     trials = [FeedbackTrial(robot, model, gait, kp, kd) for gait in gaits]
-    costs = [float(np.median(trial.loop.run(trial.calm(), WALKED).cost)) for trial in trials]
+    costs = [float(np.median(trial.loop.run(trial.calm(), WALK_DURATION).cost))
+             for trial in trials]
     compute = map if executor is None else executor.map
 
     def price(candidates: Sequence[Gains], draw: int) -> list[float]:
-        jobs = [PriceJob(robot, model, gaits, candidates[k:k + TOGETHER], draw, costs, kp, kd)
-                for k in range(0, len(candidates), TOGETHER)]
+        jobs = [PriceJob(robot, model, gaits, candidates[k:k + BATCH_SIZE], draw, costs, kp, kd)
+                for k in range(0, len(candidates), BATCH_SIZE)]
         return [item for benefits in compute(prices, jobs) for item in benefits]
 
     own = robot.feedback or OwnFeedback()
     starts = [replace(own, laws={**own.laws, **dict.fromkeys(without, False)})
-              for without in WITHOUT]
+              for without in LAWS_OFF]
     usual = [robot_gains(replace(robot, feedback=item)) for item in starts]
     cheapest = int(np.argmin(price(usual, seed)))
     own, before = starts[cheapest], usual[cheapest]
-    names = [name for law, listed in SEARCHED.items() if getattr(before, law) for name in listed]
-    most = math.log(FACTOR)
+    names = [name for law, listed in GAIN_NAMES.items() if getattr(before, law) for name in listed]
+    most = math.log(MAX_FACTOR)
 
     def changed(logs: np.ndarray) -> Gains:
         return before._replace(**scaled_gains(before, names, logs, GAINS))
 
-    result, tried = cma_search(np.zeros(len(names)), SPREAD, (-most, most), seed,
+    result, tried = cma_search(np.zeros(len(names)), INITIAL_SIGMA, (-most, most), seed,
                                lambda points, draw: price([*map(changed, points)], draw),
                                evaluations, update, len(starts))
     after = changed(result.xfavorite)
@@ -401,7 +404,7 @@ def tune_feedback(robot: Robot, model: str, gaits: Sequence[str], evaluations: i
 def _compared(trials: Sequence[FeedbackTrial], before: Gains, after: Gains, seed: int
               ) -> TunedFeedback:
     """Return the results of fresh pushes with the gains before and after a search."""
-    fresh = [trial.pushed(np.random.default_rng(FRESH + seed), JUDGED, IMPULSES)
+    fresh = [trial.pushed(np.random.default_rng(TEST_SEED + seed), NUM_TEST_PUSHES, IMPULSES)
              for trial in trials]
 
     def survivors(gains: Gains | None) -> np.ndarray:

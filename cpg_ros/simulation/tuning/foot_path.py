@@ -35,28 +35,28 @@ from cpg_ros.simulation.robot_model import SimulationError
 from cpg_ros.simulation.robot_setup.model_reading import geometry_from, load_description
 import numpy as np
 
-#: CENTRED: distance of the centre of mass from the middle of the feet, as a fraction of half the
-#: distance from hind to fore feet, that is ignored.
-CENTRED = 0.1
+#: CENTER_TOLERANCE: distance of the centre of mass from the middle of the feet, as a fraction of
+#: half the distance from hind to fore feet, that is ignored.
+CENTER_TOLERANCE = 0.1
 
 
 def centre_ahead(body: Body, parts: Anatomy) -> float:
     """Return how far the centre of mass is ahead of the middle of the feet in the stand, m.
 
-    It is 0 if it is below CENTRED of half the distance from hind to fore feet.
+    It is 0 if it is below CENTER_TOLERANCE of half the distance from hind to fore feet.
     """
     body.reset()
     feet = parts.sole_positions(body.data)[:, 0]
     ahead = float(body.data.subtree_com[parts.base, 0] - feet.mean())
-    return ahead if abs(ahead) > 0.5 * CENTRED * np.ptp(feet) else 0.0
+    return ahead if abs(ahead) > 0.5 * CENTER_TOLERANCE * np.ptp(feet) else 0.0
 
 
 #: POINTS: points of a cycle at which curves are fitted.
 POINTS = 128
-#: OWN: fraction of the cycle that a leg stands by the weights alone, without a duty factor.
-OWN = 0.5
-#: SLOPE: weight of the curves' slopes in a fit, in units of half of the distance of two points.
-SLOPE = 6.4
+#: Fraction of the cycle that a leg stands by the weights alone, without a duty factor.
+DEFAULT_DUTY = 0.5
+#: Weight of the curves' slopes in a fit, in units of half of the distance of two points.
+SLOPE_WEIGHT = 6.4
 #: DIGITS: decimals of weights and offsets, rad, in the file.
 DIGITS = 4
 
@@ -167,7 +167,7 @@ def basis(orbit: Orbit, cell: int, harmonics: int, path: FootTrajectory) -> np.n
     cells = np.array([cell])
     # Phase 0 of a leg is where x peaks.
     peak = standing(orbit, cells, harmonics)[0]
-    duty = Duty(orbit, cells, peak - path.lead, np.array([OWN]), np.array([path.duty]))
+    duty = Duty(orbit, cells, peak - path.lead, np.array([DEFAULT_DUTY]), np.array([path.duty]))
     psi = joint_readout(orbit, np.full(6, cell), np.eye(6), cells, harmonics,
                         np.repeat(duty.of_cells(np.zeros(1, int), cells), 6, axis=0)).angles
     phase = peak + np.arange(POINTS) / POINTS
@@ -189,7 +189,8 @@ def fit(curves: np.ndarray, psi: np.ndarray) -> tuple[float, np.ndarray, np.ndar
     """
     ones, none = np.ones((psi.shape[1], 1)), np.zeros((psi.shape[1], 6))
     table = np.block([[ones, psi.T, none], [ones, none, psi.T]])
-    both = [np.stack([columns, SLOPE * (np.roll(columns, -1, -2) - np.roll(columns, 1, -2))])
+    both = [np.stack([columns,
+                      SLOPE_WEIGHT * (np.roll(columns, -1, -2) - np.roll(columns, 1, -2))])
             for columns in (table.reshape(2, -1, 13), curves[:, :, None])]
     terms = np.linalg.lstsq(both[0].reshape(-1, 13), both[1].ravel(), rcond=None)[0]
     rest = (table @ terms - curves.ravel()).reshape(curves.shape)

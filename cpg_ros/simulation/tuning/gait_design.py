@@ -14,8 +14,8 @@
 
 """Design of a gait in a few numbers, and the target of each gait for a knee-high robot.
 
-All figures are for a leg of LENGTH from thigh joint to foot in the stand; for other robots lengths
-scale with the leg length, times and speeds with its square root, as for pendulums.
+All figures are for a leg of LEG_LENGTH from thigh joint to foot in the stand; for other robots
+lengths scale with the leg length, times and speeds with its square root, as for pendulums.
 """
 
 from collections.abc import Callable
@@ -32,27 +32,27 @@ import numpy as np
 
 # Steering tables: measured speed and yaw rate of a tuned gait by the length of its strides.
 
-#: STRIDES: strides that are tried; SLOWER: by how much the legs move slower at a stride of 0;
-#: FASTER: factors of the frequency that are tried at a stride of 1; ROOM: least distance from the
-#: joints' speed limits, as a fraction, with which they are.
+#: STRIDES: strides that are tried; SLOWDOWN: by how much the legs move slower at a stride of 0;
+#: FREQUENCY_FACTORS: factors of the frequency that are tried at a stride of 1; SPEED_MARGIN: least
+#: distance from the joints' speed limits, as a fraction, with which they are.
 STRIDES = (-0.4, -0.2, 0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
-SLOWER = 0.2
-FASTER, ROOM = (1.1, 1.2, 1.3, 1.4), 0.05
-#: ROWS: most rows of a table.
-ROWS = len(STRIDES) + len(FASTER)
-#: DIFFERENCE: of the strides of both sides when turning is measured.
-DIFFERENCE = 0.5
+SLOWDOWN = 0.2
+FREQUENCY_FACTORS, SPEED_MARGIN = (1.1, 1.2, 1.3, 1.4), 0.05
+#: MAX_ROWS: most rows of a table.
+MAX_ROWS = len(STRIDES) + len(FREQUENCY_FACTORS)
+#: STRIDE_DIFFERENCE: of the strides of both sides when turning is measured.
+STRIDE_DIFFERENCE = 0.5
 #: DURATION: of a run, s.
 DURATION = 8.0
-#: SOFT: stride up to which a gait with stiff servos leaves them as they are.
-SOFT = 0.4
+#: SOFT_STRIDE: stride up to which a gait with stiff servos leaves them as they are.
+SOFT_STRIDE = 0.4
 #: FLOORS: floors over which speeds and yaw rates are averaged.
 FLOORS = (Scenario(), Scenario(0.7))
-#: A gait counts as steered if its speed rises by RISE per row, m/s, and its yaw rate is at least
-#: TURN for a difference of strides of 1, rad/s; for slow gaits, RISE_FRACTION and
-#: TURN_FRACTION of the top speed, m/s, are enough.
-RISE, TURN = 0.01, 0.1
-RISE_FRACTION, TURN_FRACTION = 0.05, 0.5
+#: A gait counts as steered if its speed rises by MIN_SPEED_STEP per row, m/s, and its yaw rate is
+#: at least MIN_YAW_RATE for a difference of strides of 1, rad/s; for slow gaits, STEP_FRACTION
+#: and YAW_FRACTION of the top speed, m/s, are enough.
+MIN_SPEED_STEP, MIN_YAW_RATE = 0.01, 0.1
+STEP_FRACTION, YAW_FRACTION = 0.05, 0.5
 
 
 def measure(batch: OpenLoopBatch, plan: GaitPlan,
@@ -60,27 +60,28 @@ def measure(batch: OpenLoopBatch, plan: GaitPlan,
     """Measure a gait at several strides; None if its speed does not increase with them.
 
     Rows are dropped at the ends where the robot falls or its speed does not increase. Strides
-    above SOFT are measured with servos as stiff as the gait's target has them. ``update`` takes
-    the number of strides measured so far.
+    above SOFT_STRIDE are measured with servos as stiff as the gait's target has them. ``update``
+    takes the number of strides measured so far.
     """
     left, stiffness = plan.robot.left, AIMS[plan.name].stiffness
-    tried = [*((stride, 1.0 - SLOWER * (1.0 - abs(stride))) for stride in STRIDES),
-             *((1.0, pace) for pace in FASTER
-               if pace <= (1.0 - ROOM) * plan.most_pace)]
+    tried = [*((stride, 1.0 - SLOWDOWN * (1.0 - abs(stride))) for stride in STRIDES),
+             *((1.0, pace) for pace in FREQUENCY_FACTORS
+               if pace <= (1.0 - SPEED_MARGIN) * plan.most_pace)]
     rows = []
     for done, (stride, pace) in enumerate(tried):
         # Within strides of -1 to 1 on both sides.
-        middle = min(stride, 1.0 - 0.5 * DIFFERENCE)
+        middle = min(stride, 1.0 - 0.5 * STRIDE_DIFFERENCE)
         commands = [np.full(left.size, stride),
-                    *(middle + sign * 0.5 * DIFFERENCE * np.where(left, -1.0, 1.0)
+                    *(middle + sign * 0.5 * STRIDE_DIFFERENCE * np.where(left, -1.0, 1.0)
                       for sign in (1.0, -1.0))]
-        kp = round(1.0 + (stiffness - 1.0) * max(stride - SOFT, 0.0) / (1.0 - SOFT), KP_DIGITS)
+        kp = round(1.0 + (stiffness - 1.0) * max(stride - SOFT_STRIDE, 0.0)
+                   / (1.0 - SOFT_STRIDE), KP_DIGITS)
         trials = batch.run([(targets(plan, DURATION, batch.timestep, command.tolist(), pace),
                              replace(floor, kp=kp)) for command in commands for floor in FLOORS])
         speeds = [trial.speed for trial in trials]
         turns = [trial.turn for trial in trials]
         n = len(FLOORS)
-        turn = (np.mean(turns[n:2 * n]) - np.mean(turns[2 * n:])) / (2.0 * DIFFERENCE)
+        turn = (np.mean(turns[n:2 * n]) - np.mean(turns[2 * n:])) / (2.0 * STRIDE_DIFFERENCE)
         rows.append((float(np.mean(speeds[:n])), stride, pace * plan.frequency, float(turn), kp,
                      all(trial.upright for trial in trials)))
         update(done + 1)
@@ -92,7 +93,7 @@ def _rising(rows: list[tuple[float, float, float, float, float, bool]]) -> Steer
     zero = STRIDES.index(0.0)
     first = last = zero
     top = max(rows[len(STRIDES) - 1][0], 0.0)
-    rise, turning = min(RISE, RISE_FRACTION * top), min(TURN, TURN_FRACTION * top)
+    rise, turning = min(MIN_SPEED_STEP, STEP_FRACTION * top), min(MIN_YAW_RATE, YAW_FRACTION * top)
     good = [upright and turn >= turning for *_, turn, _, upright in rows]
     while last + 1 < len(rows) and good[last + 1] and (
             rows[last + 1][0] >= rows[last][0] + rise):
@@ -108,12 +109,12 @@ def _rising(rows: list[tuple[float, float, float, float, float, bool]]) -> Steer
                          stiffness if max(stiffness) > 1.0 else ())
 
 
-#: LENGTH: of a leg in the stand, m.
-LENGTH = 0.2664
-#: SHORTER: fraction by which strides of the gentlest start are shorter.
-SHORTER = 0.5
-#: CLEAR: height that feet should exceed for a tenth of the time, m.
-CLEAR = 0.02
+#: LEG_LENGTH: of a leg in the stand, m.
+LEG_LENGTH = 0.2664
+#: STRIDE_REDUCTION: fraction by which strides of the gentlest start are shorter.
+STRIDE_REDUCTION = 0.5
+#: FOOT_CLEARANCE: height that feet should exceed for a tenth of the time, m.
+FOOT_CLEARANCE = 0.02
 
 
 @dataclass(frozen=True)
@@ -180,7 +181,7 @@ class GaitTarget:
         start, low = self.start, self.low
         return replace(self, start=replace(
             start, frequency=start.frequency + fraction * (low.frequency - start.frequency),
-            stride=max(low.stride, (1.0 - SHORTER * fraction) * start.stride),
+            stride=max(low.stride, (1.0 - STRIDE_REDUCTION * fraction) * start.stride),
             push_fore=(1.0 - fraction) * start.push_fore,
             push_hind=(1.0 - fraction) * start.push_hind,
             lift=start.lift + fraction * (low.lift - start.lift),
@@ -262,7 +263,7 @@ def price(trial: RunMetrics, aim: GaitTarget, duration: float, scale: float = 1.
     turning = (0.15 * min(abs(math.degrees(trial.turn)) / 0.5, 8.0)**2
                + 0.1 * min(abs(trial.heading) / 4.0, 8.0)**2)
     leaning = (trial.sway / 5.0)**1.5
-    dragging = 6.0 * max(0.0, 1.0 - trial.lift / (CLEAR * scale))
+    dragging = 6.0 * max(0.0, 1.0 - trial.lift / (FOOT_CLEARANCE * scale))
     restless = 0.5 * trial.bob / (0.01 * scale)
     if aim.hops:
         restless = 5.0 * max(0.0, 1.0 - trial.hops / (0.85 * aim.hops * duration))

@@ -38,24 +38,24 @@ from cpg_ros.simulation.robot_model import SimulationError
 from cpg_ros.simulation.robot_setup.walk_recording import calibrated
 from cpg_ros.simulation.run_metrics import RunMetrics
 from cpg_ros.simulation.scenario import Scenario
-from cpg_ros.simulation.tuning.foot_path import centre_ahead, FootTrajectoryFit, OWN
+from cpg_ros.simulation.tuning.foot_path import centre_ahead, DEFAULT_DUTY, FootTrajectoryFit
 from cpg_ros.simulation.tuning.gait_design import (
     AIMS,
     Design,
     GaitTarget,
-    LENGTH,
+    LEG_LENGTH,
+    MAX_ROWS,
     measure,
     price,
-    ROWS,
 )
 import numpy as np
 from scipy.stats import binomtest
 
-#: GENERATION: number of points of a generation of CMA-ES.
-GENERATION = 12
+#: POPULATION_SIZE: number of points of a generation of CMA-ES.
+POPULATION_SIZE = 12
 
-#: GOOD: fraction of the target speed from which on a gait is good.
-GOOD = 0.3
+#: MIN_SPEED_RATIO: fraction of the target speed from which on a gait is good.
+MIN_SPEED_RATIO = 0.3
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class Tuned:
         price: of the design.
         first: price of the initial design.
         motion: of the robot by the design.
-        trial: LONG seconds of it on a good floor, undisturbed.
+        trial: REPORT_DURATION seconds of it on a good floor, undisturbed.
         aim: target speed on this robot, m/s.
         pace: fraction of the usual frequencies and speed that the joints can follow.
 
@@ -86,7 +86,7 @@ class Tuned:
     @property
     def good(self) -> bool:
         """Whether it stays upright and reaches enough of the target speed."""
-        return self.trial.upright and self.trial.speed >= GOOD * self.aim
+        return self.trial.upright and self.trial.speed >= MIN_SPEED_RATIO * self.aim
 
     @property
     def verdict(self) -> str:
@@ -144,26 +144,26 @@ class ClosestDesign:
                 f'({SERVOS}), make the robot file anew with --velocity and what it reaches')
 
 
-#: SHORT: duration of the runs that compare designs, s; LONG: duration of the run that is reported,
-#: s.
-SHORT, LONG = 6.0, 10.0
+#: SEARCH_DURATION: duration of the runs that compare designs, s; REPORT_DURATION: duration of the
+#: run that is reported, s.
+SEARCH_DURATION, REPORT_DURATION = 6.0, 10.0
 #: SCENARIOS: conditions of the runs: good floors, and slippery ones with other loads and pushes.
 SCENARIOS = (Scenario(), Scenario(0.9),
              Scenario(0.6, 1.05, ((2.5, 0.0, 50.0), (4.2, 50.0, 0.0))),
              Scenario(0.8, 0.95, ((3.0, -50.0, 0.0), (4.5, 0.0, -50.0))))
-#: MASS: of the robot to which these pushes apply, kg; for others they scale to the same speed.
-MASS = 15.2
-#: REFUSED: price of a design that the joints cannot follow; BEYOND: price of each unit beyond a
-#: limit, which leads the search back within it; NO_GAIT: price of a design without a gait.
-REFUSED, BEYOND, NO_GAIT = 1000.0, 100.0, 1e5
-#: For slow joints. SLOWEST: least factor of a gait's usual frequencies that is tried; SMALLEST: of
-#: the strides of the nearest design where it is the slowest; ROOM: fraction of their speed limit
-#: with which the gentlest start begins.
-SLOWEST, SMALLEST, ROOM = 0.3, 0.5, 0.9
-#: SPREAD: initial standard deviation of the designs about the start (1: the whole range).
-SPREAD = 0.15
-#: GENTLE: starts that are tried first, by how much gentler than the usual one, 0 to 1.
-GENTLE = (0.0, 0.25, 0.5, 0.75, 1.0)
+#: Mass of the robot to which these pushes apply, kg; for others they scale to the same speed.
+REFERENCE_MASS = 15.2
+#: Prices. INFEASIBLE_COST: of a design that the joints cannot follow; EXCESS_COST: of each unit
+#: beyond a limit, which leads the search back within it; NO_GAIT_COST: of a design without a gait.
+INFEASIBLE_COST, EXCESS_COST, NO_GAIT_COST = 1000.0, 100.0, 1e5
+#: For slow joints. MIN_RATIO: least factor of a gait's usual frequencies that is tried;
+#: MIN_STRIDE_RATIO: of the strides of the nearest design where it is the slowest;
+#: SPEED_LIMIT_RATIO: fraction of their speed limit with which the gentlest start begins.
+MIN_RATIO, MIN_STRIDE_RATIO, SPEED_LIMIT_RATIO = 0.3, 0.5, 0.9
+#: INITIAL_SIGMA: initial standard deviation of the designs about the start (1: the whole range).
+INITIAL_SIGMA = 0.15
+#: START_FRACTIONS: starts that are tried first, by how much gentler than the usual one, 0 to 1.
+START_FRACTIONS = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 
 class Tuner:
@@ -190,7 +190,7 @@ class Tuner:
         say('the joints have kp {:g} N m/rad and kd {:g} N m s/rad'.format(*body.gains)
             + (f', estimated from the mass of {body.mass:.1f} kg' if None in (kp, kd) else ''))
         self.feet = FootTrajectoryFit(robot, model)
-        self.scale = self.feet.length / LENGTH
+        self.scale = self.feet.length / LEG_LENGTH
         # Designs are of robots whose feet bear alike.
         self.ahead = centre_ahead(body, self.batch.parts)
         if self.ahead:
@@ -198,7 +198,7 @@ class Tuner:
                 f'{"ahead of" if self.ahead > 0.0 else "behind"} the middle of the feet in the '
                 'stand: gaits move the feet below it')
         # Scale the pushes to the same change of the Froude number.
-        heavy = body.mass / MASS * math.sqrt(self.scale)
+        heavy = body.mass / REFERENCE_MASS * math.sqrt(self.scale)
         self.scenarios = tuple(replace(scenario, pushes=tuple(
             (when, heavy * forward, heavy * left) for when, forward, left in scenario.pushes))
             for scenario in SCENARIOS)
@@ -212,7 +212,7 @@ class Tuner:
             for leg in self.robot.legs)}
         return Motion(round(design.frequency / math.sqrt(self.scale), 3),
                       self.feet.joints(gait_of(preset, preset.network)[0], paths),
-                      duty=design.duty, stance=(-design.lead, OWN))
+                      duty=design.duty, stance=(-design.lead, DEFAULT_DUTY))
 
     def plan(self, gait: str, motion: Motion, network: str = '') -> GaitPlan:
         """Plan a gait on one of the robot's networks or the first; errors as of plan."""
@@ -232,7 +232,7 @@ class Tuner:
         aim = aim or AIMS[gait]
         aim = replace(aim, speed=aim.speed * math.sqrt(self.scale),
                       hops=aim.hops / math.sqrt(self.scale))
-        result, runs, runnable = np.full(len(designs), NO_GAIT), [], []
+        result, runs, runnable = np.full(len(designs), NO_GAIT_COST), [], []
         for k, design in enumerate(designs):
             motion, plans, errors = self.motion(gait, design), [], []
             try:
@@ -246,16 +246,16 @@ class Tuner:
             if errors:
                 # Of all networks, so that a slower one fits all of them.
                 worst = max(errors, key=lambda error: error.excess)
-                result[k] = REFUSED + BEYOND * worst.excess
+                result[k] = INFEASIBLE_COST + EXCESS_COST * worst.excess
                 if self._nearest is None or worst.excess < self._nearest.error.excess:
                     self._nearest = ClosestDesign(design, motion.frequency or 0.0, self.scale,
                                                   worst)
                 continue
-            angles = [targets(plan, SHORT, self.batch.timestep) for plan in plans]
+            angles = [targets(plan, SEARCH_DURATION, self.batch.timestep) for plan in plans]
             scenarios = [replace(scenario, kp=aim.stiffness) for scenario in self.scenarios]
             runs += list(zip(cycle(angles), scenarios, strict=False))
             runnable.append(k)
-        prices = [min(price(trial, aim, SHORT, self.scale), REFUSED - 1.0)
+        prices = [min(price(trial, aim, SEARCH_DURATION, self.scale), INFEASIBLE_COST - 1.0)
                   for trial in self.batch.run(runs)]
         for k, runs_of_k in zip(runnable, np.reshape(prices, (-1, len(SCENARIOS))), strict=True):
             result[k] = 0.6 * runs_of_k.mean() + 0.4 * runs_of_k.max()
@@ -276,26 +276,27 @@ class Tuner:
         best = aim.start
 
         result, tried = cma_search(
-            aim.start_point, SPREAD, (0.0, 1.0), seed,
+            aim.start_point, INITIAL_SIGMA, (0.0, 1.0), seed,
             lambda points, _: self.prices(gait, [*map(aim.design, points)], aim).tolist(),
             evaluations, update, len(aims))
         if result.fbest < cheapest:
             best, cheapest = aim.design(result.xbest), float(result.fbest)
         near = self._nearest
-        if cheapest >= REFUSED and near is not None and near.fraction < 1.0:
+        if cheapest >= INFEASIBLE_COST and near is not None and near.fraction < 1.0:
             # The nearest one, by so much slower that its joints follow, or else smaller.
-            fraction, keys = ROOM * near.fraction, ['stride', 'lift', 'push_fore', 'push_hind']
-            if fraction * aim.speed >= SLOWEST * AIMS[gait].speed:
+            fraction = SPEED_LIMIT_RATIO * near.fraction
+            keys = ['stride', 'lift', 'push_fore', 'push_hind']
+            if fraction * aim.speed >= MIN_RATIO * AIMS[gait].speed:
                 keys, aim = ['frequency'], aim.slower(fraction)
-            if keys == ['frequency'] or fraction >= SMALLEST:
+            if keys == ['frequency'] or fraction >= MIN_STRIDE_RATIO:
                 best, tried = replace(near.design, **{
                     key: fraction * getattr(near.design, key) for key in keys}), tried + 1
                 cheapest = float(self.prices(gait, [best], aim)[0])
-        if cheapest >= REFUSED:
+        if cheapest >= INFEASIBLE_COST:
             raise NoDesign(f"{gait}: none of {tried} designs keeps to the joints' limits"
                            + (f'; {self._nearest}' if self._nearest else ''))
         motion = self.motion(gait, best)
-        angles = targets(self.plan(gait, motion), LONG, self.batch.timestep)
+        angles = targets(self.plan(gait, motion), REPORT_DURATION, self.batch.timestep)
         trial = self.batch.run([(angles, Scenario(kp=aim.stiffness))])[0]
         return Tuned(gait, best, cheapest, first, motion, trial,
                      aim.speed * math.sqrt(self.scale), aim.speed / AIMS[gait].speed)
@@ -303,12 +304,12 @@ class Tuner:
     def _starts(self, gait: str) -> tuple[list[GaitTarget], np.ndarray]:
         """Return initial designs, gentler ones and, if joints cannot follow any, slower ones."""
         self._nearest = None
-        aims = [AIMS[gait].gentler(fraction) for fraction in GENTLE]
+        aims = [AIMS[gait].gentler(fraction) for fraction in START_FRACTIONS]
         prices = self.prices(gait, [aim.start for aim in aims])
         nearest = self._nearest
-        if prices.min() < REFUSED or nearest is None or nearest.fraction == 1.0:
+        if prices.min() < INFEASIBLE_COST or nearest is None or nearest.fraction == 1.0:
             return aims, prices
-        aims = [aim.slower(max(ROOM * nearest.fraction, SLOWEST)) for aim in aims]
+        aims = [aim.slower(max(SPEED_LIMIT_RATIO * nearest.fraction, MIN_RATIO)) for aim in aims]
         return aims, self.prices(gait, [aim.start for aim in aims], aims[0])
 
 
@@ -343,7 +344,7 @@ def search(trial: DesignTrial, tuner: Tuner | None = None,
 
 def _here(tuner: Tuner, trials: Sequence[DesignTrial]) -> Iterator[Tuned | NoDesign]:
     """Run searches one after the other in this process, on the threads of one tuner."""
-    each = trials[0].evaluations + ROWS
+    each = trials[0].evaluations + MAX_ROWS
     with progress_bar('tuning', each * len(trials)) as bar:
         for k, trial in enumerate(trials):
             yield search(trial, tuner, lambda done, k=k: bar(k * each + done))  # type: ignore[misc]
@@ -415,7 +416,7 @@ def cma_search(start: np.ndarray, spread: float, bounds: tuple[float, float], se
                price: Callable[[Sequence[np.ndarray], int], list[float]], evaluations: int,
                update: Callable[[int], None] = lambda done: None, done: int = 0
                ) -> tuple[Any, int]:
-    """Minimise a price by CMA-ES, GENERATION points at a time.
+    """Minimise a price by CMA-ES, POPULATION_SIZE points at a time.
 
     Args:
         start: mean of the first generation, shape (n,).
@@ -433,7 +434,7 @@ def cma_search(start: np.ndarray, spread: float, bounds: tuple[float, float], se
 
     """
     search = cma_es().CMAEvolutionStrategy(start, spread, {
-        'bounds': [*bounds], 'seed': seed + 1, 'popsize': GENERATION, 'verbose': -9})
+        'bounds': [*bounds], 'seed': seed + 1, 'popsize': POPULATION_SIZE, 'verbose': -9})
     draws = np.random.default_rng([seed, 1])
     while done < evaluations:
         points = search.ask()

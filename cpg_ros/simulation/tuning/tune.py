@@ -45,7 +45,7 @@ from cpg_ros.simulation.robot_setup.description_match import invented_limits
 from cpg_ros.simulation.tuning.biped import tune_biped
 from cpg_ros.simulation.tuning.feedback import evaluate_feedback, evaluated_gaits, tune_feedback
 from cpg_ros.simulation.tuning.gait_design import AIMS
-from cpg_ros.simulation.tuning.gaits import GOOD, LONG, tune, Tuned
+from cpg_ros.simulation.tuning.gaits import MIN_SPEED_RATIO, REPORT_DURATION, tune, Tuned
 
 DESCRIPTION = """\
 Tune a robot's gaits in simulation. CMA-ES optimises foot paths described by a few lengths and
@@ -55,11 +55,11 @@ with shorter strides, for use with cmd_vel, and whether feedback saves the robot
 not, the file says that it is off by default."""
 EPILOG = f"""\
 exit codes: 0 written, 1 no gait is good (written if any is possible), 2 invalid arguments, 130
-stopped (nothing written). A gait is good if the robot stays upright and reaches {100 * GOOD:g} %
-of the target speed. With --feedback, 1 means that no better gains were found, and that the file
-has those of before."""
-#: Default numbers of evaluations. DESIGNS: designs of a gait; GAINS: sets of gains.
-DESIGNS, GAINS = 240, 120
+stopped (nothing written). A gait is good if the robot stays upright and reaches
+{100 * MIN_SPEED_RATIO:g} % of the target speed. With --feedback, 1 means that no better gains
+were found, and that the file has those of before."""
+#: Default numbers of evaluations. NUM_DESIGNS: designs of a gait; NUM_GAINS: sets of gains.
+NUM_DESIGNS, NUM_GAINS = 240, 120
 
 
 def _parser() -> Parser:
@@ -77,7 +77,7 @@ def _parser() -> Parser:
                         'pushes, rough ground, speed and cost; of a biped with soles, those of '
                         'its walk, over pushes, tiles, speed and tilt')
     parser.add_argument('--evaluations', type=int, metavar='N', help='designs to try for each '
-                        f'gait (default: {DESIGNS}), or sets of gains (default: {GAINS})')
+                        f'gait (default: {NUM_DESIGNS}), or sets of gains (default: {NUM_GAINS})')
     parser.add_argument('--seed', type=int, default=0, metavar='N',
                         help='seed of the search; the same seed gives the same result '
                         '(default: %(default)s)')
@@ -173,7 +173,7 @@ def _refuse_out(args: argparse.Namespace) -> None:
 
 def _tune(args: argparse.Namespace) -> int:
     if args.evaluations is None:
-        args.evaluations = GAINS if args.feedback else DESIGNS
+        args.evaluations = NUM_GAINS if args.feedback else NUM_DESIGNS
     _refuse_options(args)
     robot, report = load_robot(args.robot), partial(note, 'tune')
     if args.feedback:
@@ -193,8 +193,8 @@ def _tune(args: argparse.Namespace) -> int:
         lines.append(_verdict(robot))
     write_robot(args.out, robot, '\n'.join([
         f'Gaits made by: ros2 run cpg_ros {args.command}',
-        f'{LONG:g} s in simulation from the stand:', *lines]))
-    say('\n'.join([f'{LONG:g} s from the stand in simulation:', *lines,
+        f'{REPORT_DURATION:g} s in simulation from the stand:', *lines]))
+    say('\n'.join([f'{REPORT_DURATION:g} s from the stand in simulation:', *lines,
                    f'written: {args.out}']))
     if not any(design.good for design in designs):
         report('no gait is good')

@@ -67,9 +67,9 @@ def test_better_gains_are_found_and_found_again(monkeypatch):
     assert robot.biped.gains['place_x'] == pytest.approx(BEST, rel=0.15)
     assert tune_biped(BAD, 'humanoid', 240, 5) == (robot, found)
     # What judges has not been met by the search, whatever its speed or push.
-    judged = {walk.seed for walks in body.walks if len(walks) == biped.BATCH
+    judged = {walk.seed for walks in body.walks if len(walks) == biped.WALKS_PER_JOB
               for walk in walks}
-    met = {walk.seed for walks in body.walks if len(walks) > biped.BATCH for walk in walks}
+    met = {walk.seed for walks in body.walks if len(walks) > biped.WALKS_PER_JOB for walk in walks}
     assert len(judged) >= 88 and met and not judged & met
 
 

@@ -33,9 +33,9 @@ from cpg_ros.simulation.tuning.gaits import Survivors
 
 @pytest.fixture
 def quick(monkeypatch):
-    monkeypatch.setattr(feedback, 'BENEFIT_PUSHES', 8)
+    monkeypatch.setattr(feedback, 'NUM_BENEFIT_PUSHES', 8)
     monkeypatch.setattr(feedback, 'BENEFIT_IMPULSES', (0.6,))
-    monkeypatch.setattr(feedback, 'WALKED', 3.0)
+    monkeypatch.setattr(feedback, 'WALK_DURATION', 3.0)
 
 
 def test_feedback_that_saves_a_robot_is_on(quick):
@@ -52,7 +52,7 @@ def test_feedback_that_saves_a_robot_is_on(quick):
 def test_feedback_that_fells_a_robot_is_off_and_its_own_gains_stay(quick, monkeypatch):
     """Posture that answers a lean ten times as much fells it, with reflexes or without."""
     own = OwnFeedback(laws={'placement': False}, gains={'roll': 15.0, 'pitch': 11.0})
-    monkeypatch.setattr(feedback, 'WITHOUT', ((), ('reflexes',)))
+    monkeypatch.setattr(feedback, 'LAWS_OFF', ((), ('reflexes',)))
     robot, (one,) = evaluate_feedback(replace(GO2, feedback=own), 'go2', ['trot'], seed=4)
     assert not one.helps and one.undisturbed.lost
     assert ': it makes the robot fall without' in str(one)
@@ -121,8 +121,8 @@ def test_it_is_judged_on_late_and_noisy_sensors(quick, monkeypatch):
         return run(self, *arguments, noise=noise, **options)
 
     monkeypatch.setattr(feedback.ClosedLoopBatch, 'run', record)
-    monkeypatch.setattr(feedback, 'WALKED', 0.5)
-    monkeypatch.setattr(feedback, 'WATCHED', 0.5)
+    monkeypatch.setattr(feedback, 'WALK_DURATION', 0.5)
+    monkeypatch.setattr(feedback, 'TRIAL_DURATION', 0.5)
     evaluate_feedback(replace(GO2, feedback=None), 'go2', ['trot'], seed=4)
     assert {one.delay for one in seen} == {0.01, 0.02}
     assert all(one.gyroscope_noise and one.accelerometer_noise and one.force_noise for one in seen)

@@ -29,7 +29,7 @@ if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'cma')):
     pytest.skip('the extra [sim] is not installed', allow_module_level=True)
 
 from cpg_ros.simulation.tuning import feedback  # noqa: I100
-from cpg_ros.simulation.tuning.feedback import FeedbackTrial, tune_feedback, UNDISTURBED
+from cpg_ros.simulation.tuning.feedback import FeedbackTrial, NUM_CALM, tune_feedback
 from cpg_ros.simulation.tuning.gaits import Survivors
 
 #: The step, s, with which the bodies survive most, and that of robots before the search.
@@ -104,7 +104,7 @@ def test_where_nothing_is_better_gains_stay(body, monkeypatch):
 def test_feedback_that_fells_undisturbed_robots_is_off(body, monkeypatch):
     monkeypatch.setattr(body, 'falls_undisturbed', True)
     robot, found = tune_feedback(ROBOT, 'go2', ['trot'], 20, 5)
-    assert found.fell == UNDISTURBED and not found.better and not robot.feedback.enabled
+    assert found.fell == NUM_CALM and not found.better and not robot.feedback.enabled
     assert '4 undisturbed runs fell' in robot.feedback.made
 
 
@@ -124,5 +124,5 @@ def test_gains_are_better_only_where_chance_does_not_make_them_so(after, lost, f
 
 
 def test_every_gain_that_is_searched_for_exists():
-    for law, names in feedback.SEARCHED.items():
+    for law, names in feedback.GAIN_NAMES.items():
         assert getattr(Gains(), law) and all(getattr(Gains(), name) > 0.0 for name in names)

@@ -43,8 +43,8 @@ from cpg_ros.simulation.tuning.feedback import TunedFeedback  # noqa: E402
 from cpg_ros.simulation.tuning.gait_design import AIMS  # noqa: E402
 from cpg_ros.simulation.tuning.gaits import (  # noqa: E402  # noqa: E402
     ClosestDesign,
+    INFEASIBLE_COST,
     NoDesign,
-    REFUSED,
     Survivors,
     Tuned,  # noqa: E402
     Tuner,
@@ -57,9 +57,9 @@ def quick(monkeypatch):
     aim = AIMS['trot']
     start = replace(aim.start, stride=0.11, lift=0.05, lead=0.0)
     monkeypatch.setitem(tuning.AIMS, 'trot', replace(aim, start=start))
-    monkeypatch.setattr(tuning, 'SHORT', 2.0)
-    monkeypatch.setattr(tuning, 'LONG', 2.0)
-    monkeypatch.setattr(tuning, 'GENERATION', 6)
+    monkeypatch.setattr(tuning, 'SEARCH_DURATION', 2.0)
+    monkeypatch.setattr(tuning, 'REPORT_DURATION', 2.0)
+    monkeypatch.setattr(tuning, 'POPULATION_SIZE', 6)
     monkeypatch.setattr(tuning, 'SCENARIOS', tuning.SCENARIOS[:2])
 
 
@@ -78,8 +78,8 @@ def test_the_search_improves_a_bad_start_and_can_be_repeated(quick):
 
 @pytest.fixture
 def hardly_pushed(monkeypatch):
-    for name, value in (('BENEFIT_PUSHES', 1), ('UNDISTURBED', 1), ('WALKED', 0.5),
-                        ('WATCHED', 0.5)):
+    for name, value in (('NUM_BENEFIT_PUSHES', 1), ('NUM_CALM', 1), ('WALK_DURATION', 0.5),
+                        ('TRIAL_DURATION', 0.5)):
         monkeypatch.setattr(feedback, name, value)
 
 
@@ -111,8 +111,8 @@ def test_the_tool_writes_a_robot_file_that_can_be_read(quick, hardly_pushed, tmp
 def test_a_good_gait_ends_with_code_0_and_gains_are_ones_own(hardly_pushed, tmp_path, capsys,
                                                              monkeypatch):
     monkeypatch.setattr(tuning, 'measure', lambda batch, plan, update: None)
-    monkeypatch.setattr(tuning, 'LONG', 3.0)
-    monkeypatch.setattr(tuning, 'SHORT', 2.0)
+    monkeypatch.setattr(tuning, 'REPORT_DURATION', 3.0)
+    monkeypatch.setattr(tuning, 'SEARCH_DURATION', 2.0)
     assert tool.main(['--robot', str(FILE), '--model', 'go2', '--gait', 'trot', '--evaluations',
                       '1', '--kp', '80', '--kd', '3', '--out', str(tmp_path / 'a.yaml')]) == 0
     said = capsys.readouterr()
@@ -134,7 +134,7 @@ def test_tuned_feedback_is_written_with_what_it_was_found_by(tmp_path, capsys, m
     assert tool.main(given) == 0
     gaits, *others = asked[0]
     assert {'trot', 'walk'} <= set(gaits) and not {'bound', 'jump', 'pronk'} & set(gaits)
-    assert others == [tool.GAINS, 3, None]
+    assert others == [tool.NUM_GAINS, 3, None]
     assert read_robot(out).feedback == own and '--seed 3' in out.read_text().splitlines()[0]
     # Wilson's interval of 20 of 96 by the formula: 0.1394 to 0.3001.
     assert re.search(r'without feedback 20 of 96 \(95 %: 14 to 30 %\), before 50 of .*, after 61 ',
@@ -182,7 +182,7 @@ def test_a_design_just_beyond_a_limit_of_speed_is_slowed(monkeypatch):
         k = int(np.argmin(rates))
         tuner._nearest = ClosestDesign(designs[k], rates[k], 1.0, OutOfLimits(
             'the', 'knee at 8 rad/s', rates[k] / fastest - 1.0, 'velocity'))
-        return np.full(len(designs), REFUSED + 1.0)
+        return np.full(len(designs), INFEASIBLE_COST + 1.0)
 
     monkeypatch.setattr(tuner, 'prices', prices)
     # None of the usual ones can be followed, and no slower start is tried.
@@ -202,7 +202,7 @@ def test_the_nearest_design_is_judged_by_the_network_that_asks_most(monkeypatch)
 
     monkeypatch.setattr(tuner, 'plan', refuse)
     tuner._nearest = None
-    assert tuner.prices('trot', [AIMS['trot'].start])[0] == pytest.approx(REFUSED + 60.0)
+    assert tuner.prices('trot', [AIMS['trot'].start])[0] == pytest.approx(INFEASIBLE_COST + 60.0)
     assert tuner._nearest.error.excess == 0.6
 
 
@@ -217,7 +217,7 @@ def test_the_slowest_design_just_beyond_a_limit_of_speed_is_made_smaller(monkeyp
         k = int(np.argmin(strides))
         tuner._nearest = ClosestDesign(designs[k], designs[k].frequency, 1.0, OutOfLimits(
             'the', 'knee at 8 rad/s', strides[k] / longest - 1.0, 'velocity'))
-        return np.full(len(designs), REFUSED + 1.0)
+        return np.full(len(designs), INFEASIBLE_COST + 1.0)
 
     monkeypatch.setattr(tuner, 'prices', prices)
     monkeypatch.setattr(tuner, '_starts', lambda gait: ([aim], prices(gait, [aim.start])))
@@ -246,7 +246,7 @@ def test_slow_joints_get_a_slower_gait_within_their_limits(quick):
     limit = 3.0
     robot = replace(slow(limit), networks=('delayed',))
     tuner = Tuner(robot, 'go2')
-    assert tuner.prices('trot', [AIMS['trot'].gentler(1.0).start])[0] > REFUSED
+    assert tuner.prices('trot', [AIMS['trot'].gentler(1.0).start])[0] > INFEASIBLE_COST
     found = tuner.tune('trot', 1)
     assert tuner.plan('trot', found.motion).speed.max() <= limit
     assert found.motion.frequency < AIMS['trot'].low.frequency
@@ -257,7 +257,7 @@ def test_designs_nearer_to_the_limits_are_cheaper():
     tuner = Tuner(slow(2.0), 'go2')
     start = AIMS['trot'].start
     prices = tuner.prices('trot', [start, replace(start, stride=0.5 * start.stride)])
-    assert prices[0] > prices[1] > REFUSED
+    assert prices[0] > prices[1] > INFEASIBLE_COST
 
 
 def test_gaits_that_cannot_be_had_are_named_beside_those_that_can(monkeypatch):
@@ -280,7 +280,7 @@ def test_a_gait_is_judged_by_the_networks_that_have_it(quick, monkeypatch):
     robot, alone = (replace(GO2, networks=names) for names in (
         ('delayed', 'hopf', 'matsuoka'), ('delayed',)))
     prices = [Tuner(one, 'go2').prices('jump', [AIMS['jump'].start]) for one in (robot, alone)]
-    assert prices[0] == prices[1] < REFUSED
+    assert prices[0] == prices[1] < INFEASIBLE_COST
     said = []
     monkeypatch.setattr(Tuner, 'tune', lambda self, gait, *_: refused(gait))
     with pytest.raises(SimulationError, match='jump: too fast'):
