@@ -43,7 +43,7 @@ from cpg_ros.fitting.inversion.free_parameters import (
 )
 from cpg_ros.fitting.inversion.invert import invert, TOLERANCE  # noqa: E402
 from cpg_ros.fitting.inversion.leg_duty import GaitReadout  # noqa: E402
-from cpg_ros.motion.readout import monomials, TURN  # noqa: E402
+from cpg_ros.motion.readout import monomials, TWO_PI  # noqa: E402
 from cpg_ros.networks.library.delayed import Delayed, PRESETS  # noqa: E402
 from made_up import record, weights_of  # noqa: E402
 
@@ -108,13 +108,13 @@ class Simulated:
         terms[1:] *= 2.0
         k = np.arange(terms.size)
         grid = np.arange(512) / 512
-        crest = grid[(np.exp(TURN * 1j * np.outer(grid, k)) @ terms).real.argmax()]
+        crest = grid[(np.exp(TWO_PI * 1j * np.outer(grid, k)) @ terms).real.argmax()]
         for _ in range(4):
-            turned = terms * np.exp(TURN * 1j * k * crest)
-            crest -= np.sum((1j * k * turned).real) / np.sum((-k * k * turned).real) / TURN
-        peak = np.sum((terms * np.exp(TURN * 1j * k * crest)).real)
+            turned = terms * np.exp(TWO_PI * 1j * k * crest)
+            crest -= np.sum((1j * k * turned).real) / np.sum((-k * k * turned).real) / TWO_PI
+        peak = np.sum((terms * np.exp(TWO_PI * 1j * k * crest)).real)
         for joint, cell in enumerate(joints.cells):
-            turns = np.exp(TURN * 1j * np.outer(
+            turns = np.exp(TWO_PI * 1j * np.outer(
                 joints.theta + self._orbit.phases[cell] + crest + values[2], k))
             x = (turns @ terms).real / peak
             slope = (turns @ (1j * k * terms)).real / peak

@@ -52,7 +52,7 @@ from cpg_ros.fitting.inversion.recording_fit import (  # noqa: E402
     fit_with_fallbacks,
 )
 from cpg_ros.motion.plan import gait_of, validate_orbit  # noqa: E402
-from cpg_ros.motion.robot import HARMONICS  # noqa: E402
+from cpg_ros.motion.robot import NUM_HARMONICS  # noqa: E402
 from cpg_ros.motion.robot_file import load_robot  # noqa: E402
 from cpg_ros.networks.registry import NETWORKS, PRESETS  # noqa: E402
 from generated import generated, walks  # noqa: E402
@@ -156,7 +156,7 @@ def drawn(name: str, runs: int, seed: int) -> Iterator[tuple]:
             orbit, _ = gait_of(preset, made)
         except CpgError:
             continue
-        if network.offsets or not validate_orbit(orbit, preset.gait, HARMONICS):
+        if network.offsets or not validate_orbit(orbit, preset.gait, NUM_HARMONICS):
             yield rng, preset, truth, orbit
 
 

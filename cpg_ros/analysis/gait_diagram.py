@@ -26,7 +26,7 @@ from cpg_ros.common.report_page import rendered
 from cpg_ros.dynamics.orbit import Orbit
 from cpg_ros.fitting.gaits.steady_stretch import true_runs
 from cpg_ros.motion.phase_readout import evaluate, phase_map
-from cpg_ros.motion.robot import HARMONICS
+from cpg_ros.motion.robot import NUM_HARMONICS
 from cpg_ros.networks.leg_numbers import footfall_order
 from cpg_ros.networks.network import Network
 import matplotlib
@@ -163,7 +163,7 @@ def signal(orbit: Orbit, cell: int, theta: np.ndarray, order: int = 0) -> np.nda
     phase, wave = orbit.phases[cell - 1], int(orbit.waves[cell - 1])
     if orbit.network.readout == 'waveform':
         return orbit.waveform(theta + phase, order) / orbit.peak
-    return evaluate(phase_map(orbit, HARMONICS).terms[wave], theta + phase, order)
+    return evaluate(phase_map(orbit, NUM_HARMONICS).terms[wave], theta + phase, order)
 
 
 def active(orbit: Orbit, cell: int, strides: float = STRIDES) -> list[tuple[float, float]]:

@@ -66,7 +66,7 @@ def between_speeds(speeds, speed):
 
 
 #: BINS: bins of a stride; SIGNALS: number of signals; SPEEDS: most speeds of a table.
-BINS, SIGNALS, SPEEDS = body_file.BINS, len(body_file.SIGNALS), body_file.SPEEDS
+BINS, SIGNALS, SPEEDS = body_file.NUM_BINS, len(body_file.SIGNALS), body_file.MAX_SPEEDS
 
 
 @dataclass(frozen=True)

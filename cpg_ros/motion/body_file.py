@@ -213,10 +213,10 @@ def read_feedback(reader: YamlReader, tree: Any) -> OwnFeedback:
     return reader.record(OwnFeedback, tree, 'feedback', imu_mount=mount)
 
 
-#: BINS: bins of the stride in an efference table; SPEEDS: most speeds of a table.
-BINS, SPEEDS = 64, 10
-#: LEGS: text for messages on the legs that feedback can displace.
-LEGS = ('a hip about x (optional) and two joints about y; or, if it extends sideways, a coxa '
+#: NUM_BINS: bins of the stride in an efference table; MAX_SPEEDS: most speeds of a table.
+NUM_BINS, MAX_SPEEDS = 64, 10
+#: LEG_KINDS: text for messages on the legs that feedback can displace.
+LEG_KINDS = ('a hip about x (optional) and two joints about y; or, if it extends sideways, a coxa '
         'about z and two joints about one level axis; further joints are held')
 #: SIGNALS: signals of the table: velocities, m/s, rates, rad/s, and angles, rad, of the base in
 #: its own frame.
@@ -274,8 +274,8 @@ class EfferenceTable(ShortRepr):
     """Motion of the base in an undisturbed gait, by speed and by phase of the first leg.
 
     Attributes:
-        speeds: m/s, ascending, at most SPEEDS.
-        rows: signal of SIGNALS -> a row of BINS values for each speed, means over parts of the
+        speeds: m/s, ascending, at most MAX_SPEEDS.
+        rows: signal of SIGNALS -> a row of NUM_BINS values for each speed, means over parts of the
             stride.
 
     """
@@ -288,7 +288,7 @@ def body_geometry(mass: float, chains: Mapping[str, LegChain],
                   stand: Mapping[str, float]) -> BodyGeometry:
     """Return the geometry of a body.
 
-    Further joints of a leg are held. Legs that match no pattern of LEGS are left out.
+    Further joints of a leg are held. Legs that match no pattern of LEG_KINDS are left out.
 
     Args:
         mass: of the robot, kg.
@@ -373,8 +373,8 @@ def read_efference(reader: YamlReader, tree: Any, where: str) -> EfferenceTable:
     """Read the part ``efference`` of a gait, rows of numbers with spaces between them."""
     tree = reader.keys(tree, where, {'speeds', *SIGNALS})
     speeds = reader.numbers(tree['speeds'], f'{where}.speeds')
-    if len(speeds) > SPEEDS:
-        raise reader.fail(f'{where}.speeds', f'has {len(speeds)} speeds; at most {SPEEDS} fit')
+    if len(speeds) > MAX_SPEEDS:
+        raise reader.fail(f'{where}.speeds', f'has {len(speeds)} speeds; at most {MAX_SPEEDS} fit')
     reader.check_rising(speeds, f'{where}.speeds')
     rows = {}
     for key in SIGNALS:
@@ -389,11 +389,11 @@ def read_efference(reader: YamlReader, tree: Any, where: str) -> EfferenceTable:
 
 def _row(reader: YamlReader, value: Any, where: str) -> tuple[float, ...]:
     if not isinstance(value, str):
-        raise reader.fail(where, f'must be {BINS} numbers with spaces between them, not '
+        raise reader.fail(where, f'must be {NUM_BINS} numbers with spaces between them, not '
                           f'{quoted(value)}')
     words = value.split()
-    if len(words) != BINS:
-        raise reader.fail(where, f'has {len(words)} numbers, not {BINS}')
+    if len(words) != NUM_BINS:
+        raise reader.fail(where, f'has {len(words)} numbers, not {NUM_BINS}')
     try:
         return tuple(reader.number(float(word), where) for word in words)
     except ValueError as error:

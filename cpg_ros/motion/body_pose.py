@@ -30,20 +30,21 @@ from cpg_ros.motion.plan import beyond_limits, GaitPlan
 from cpg_ros.motion.robot import Robot
 import numpy as np
 
-#: POSE: names of a pose's numbers; UNITS: their units.
-POSE, UNITS = ('height', 'roll', 'pitch', 'yaw'), ('m', 'rad', 'rad', 'rad')
-#: REACHED: largest distance of a foot from its place, m.
-REACHED = 1e-5
-#: WAYPOINTS: number of poses on the way along which angles are followed; STEPS: of the search for
-#: each.
-WAYPOINTS, STEPS = 10, 20
-#: SEATED: least height of the base over its feet when it sits, as a fraction of the stand's.
-SEATED = 0.3
-#: QUICK: largest speed of a joint as the body moves, as a fraction of its limit.
-QUICK = 0.5
-#: FASTEST: largest speed of an approach, as a fraction of its way per time constant; CONSTANT:
-#: that time constant, s (``c/steering.c``).
-FASTEST, CONSTANT = 1.0 / math.e, 0.2
+#: POSE_NAMES: names of a pose's numbers; POSE_UNITS: their units.
+POSE_NAMES, POSE_UNITS = ('height', 'roll', 'pitch', 'yaw'), ('m', 'rad', 'rad', 'rad')
+#: FOOT_TOLERANCE: largest distance of a foot from its place, m.
+FOOT_TOLERANCE = 1e-5
+#: NUM_WAYPOINTS: number of poses on the way along which angles are followed; NUM_ITERATIONS: of
+#: the search for each.
+NUM_WAYPOINTS, NUM_ITERATIONS = 10, 20
+#: MIN_SEATED_HEIGHT: least height of the base over its feet when it sits, as a fraction of the
+#: stand's.
+MIN_SEATED_HEIGHT = 0.3
+#: MAX_SPEED: largest speed of a joint as the body moves, as a fraction of its limit.
+MAX_SPEED = 0.5
+#: PEAK_SPEED: largest speed of an approach, as a fraction of its way per time constant;
+#: TIME_CONSTANT: that time constant, s (``c/steering.c``).
+PEAK_SPEED, TIME_CONSTANT = 1.0 / math.e, 0.2
 
 
 class BodyPose:
@@ -81,11 +82,11 @@ class BodyPose:
                             * np.array(leg.turns)[:, None])
             limb[3:3 + count] = [leg.thigh, leg.calf, leg.foot][-count:]
             limb[6] = leg.hip if count == 3 else np.add(leg.hip, leg.thigh)
-        self.now, self.target, rate = np.zeros((3, len(POSE)))
+        self.now, self.target, rate = np.zeros((3, len(POSE_NAMES)))
         #: Rates of the stand's angles, rad/s, and arrays that only the core uses.
         self._kept = np.zeros(len(names)), rate, joints, limbs
         self._struct = Body(Smoother(self.now.ctypes.data, rate.ctypes.data,
-                                     self.target.ctypes.data, None, len(POSE) - 1, 0),
+                                     self.target.ctypes.data, None, len(POSE_NAMES) - 1, 0),
                             1.0, self._kept[0].ctypes.data, joints.ctypes.data,
                             limbs.ctypes.data, len(legs), 0)
         self.address = ctypes.addressof(self._struct)
@@ -115,10 +116,11 @@ class BodyPose:
         if self.unavailable:
             raise InputError(self.unavailable)
         angles, far = self._stand.copy(), 0.0
-        for fraction in np.arange(1, WAYPOINTS + 1) / WAYPOINTS:
+        for fraction in np.arange(1, NUM_WAYPOINTS + 1) / NUM_WAYPOINTS:
             waypoint = fraction * np.asarray(pose, dtype=float)
-            far = core().cpg_pose(self.address, waypoint.ctypes.data, angles.ctypes.data, STEPS)
-        if not far < REACHED:
+            far = core().cpg_pose(self.address, waypoint.ctypes.data, angles.ctypes.data,
+                                  NUM_ITERATIONS)
+        if not far < FOOT_TOLERANCE:
             raise InputError(f'{_text(pose)}: the feet do not reach their places on the ground')
         spans = np.zeros((2, len(angles))) if plan is None else plan.span
         gait = '' if plan is None else f" in the gait '{plan.name}'"
@@ -129,9 +131,9 @@ class BodyPose:
 
     @cached_property
     def seat(self) -> np.ndarray:
-        """Pose in which the robot sits: as low as its joints allow, down to SEATED."""
+        """Pose in which the robot sits: as low as its joints allow, down to MIN_SEATED_HEIGHT."""
         stand = -float(self._kept[3][:, 7, 2].mean())
-        low, high = -(1.0 - SEATED) * stand, 0.0
+        low, high = -(1.0 - MIN_SEATED_HEIGHT) * stand, 0.0
         tried = low
         while high - low > 1e-3:
             try:
@@ -150,8 +152,9 @@ class BodyPose:
 
         """
         way = np.abs(self.angles(pose) - self.angles(self.now))
-        constant = max(time * CONSTANT, float((way / self._fast).max()) * FASTEST / QUICK, 1e-3)
-        self._struct.pace = CONSTANT / constant
+        shortest = float((way / self._fast).max()) * PEAK_SPEED / MAX_SPEED
+        constant = max(time * TIME_CONSTANT, shortest, 1e-3)
+        self._struct.pace = TIME_CONSTANT / constant
         self.target[:] = pose
         self._struct.moving = 1
 
@@ -159,4 +162,4 @@ class BodyPose:
 def _text(pose: Sequence[float] | np.ndarray) -> str:
     """Return the nonzero numbers of a pose, such as 'body.height -0.1 m, body.roll 0.2 rad'."""
     return ', '.join(f'body.{name} {value:g} {unit}' for name, value, unit
-                     in zip(POSE, pose, UNITS, strict=True) if value)
+                     in zip(POSE_NAMES, pose, POSE_UNITS, strict=True) if value)

@@ -32,14 +32,14 @@ from cpg_ros.networks import equations as generated
 from cpg_ros.networks.registry import find_network, NETWORKS
 import numpy as np
 
-#: MOST_TRACKS: most gaits that fade into one another at once; a further one waits for a place.
-MOST_TRACKS = 4
-#: HOLD: time of an unchanged command after which a joint counts as at rest, s.
-HOLD = 0.1
-#: TABLE: number of entries of a waveform's tables over one cycle.
-TABLE = 512
+#: MAX_TRACKS: most gaits that fade into one another at once; a further one waits for a place.
+MAX_TRACKS = 4
+#: HOLD_TIME: time of an unchanged command after which a joint counts as at rest, s.
+HOLD_TIME = 0.1
+#: TABLE_SIZE: number of entries of a waveform's tables over one cycle.
+TABLE_SIZE = 512
 
-_REAL, _WHOLE, _POINTER = ctypes.c_double, ctypes.c_int32, ctypes.c_void_p
+_DOUBLE, _INT, _POINTER = ctypes.c_double, ctypes.c_int32, ctypes.c_void_p
 
 
 def _struct(name: str, *fields: tuple[Any, str]) -> type[ctypes.Structure]:
@@ -49,48 +49,49 @@ def _struct(name: str, *fields: tuple[Any, str]) -> type[ctypes.Structure]:
 
 
 Gait = _struct(
-    'Gait', (_REAL, 'frequency period start peak least'),
-    (_WHOLE, 'components cells joints legs points harmonics by_phase'),
+    'Gait', (_DOUBLE, 'frequency period start peak least'),
+    (_INT, 'components cells joints legs points harmonics by_phase'),
     (_POINTER, 'joint_cell joint_leg leg_cell wave phase shift speed weights in_place maps '
                'waves shapes circles terms crests values phase_offset phase_offset_slope '
                'cycle'))
 Net = _struct('Net', (_POINTER, 'lane clock now x slope before'), (ctypes.c_int64, 'size'))
 Track = _struct(
     'Track', (_POINTER, 'gait advance'), (Net, 'net home seed'),
-    (_REAL, 'transition progress phase phase_carry settling calm still astray distance sum'),
+    (_DOUBLE, 'transition progress phase phase_carry settling calm still astray distance sum'),
     (_POINTER, 'angle d_angle_d_phase reach legs'), (_POINTER * 6, 'clocks'), (_POINTER, 'stride'))
-Smoother = _struct('Smoother', (_POINTER, 'now rate target trim'), (_WHOLE, 'legs at_once'))
-Body = _struct('Body', (Smoother, 'pose'), (_REAL, 'pace'), (_POINTER, 'rate joints limbs'),
-               (_WHOLE, 'legs moving'))
-_RampPart = _struct('RampPart', (_REAL, 'start rate end time'))
-Ramp = _struct('Ramp', (_REAL, 'level rate past'), (_RampPart, 'part'), (_REAL, 'end time'),
+Smoother = _struct('Smoother', (_POINTER, 'now rate target trim'), (_INT, 'legs at_once'))
+Body = _struct('Body', (Smoother, 'pose'), (_DOUBLE, 'pace'), (_POINTER, 'rate joints limbs'),
+               (_INT, 'legs moving'))
+_RampPart = _struct('RampPart', (_DOUBLE, 'start rate end time'))
+Ramp = _struct('Ramp', (_DOUBLE, 'level rate past'), (_RampPart, 'part'), (_DOUBLE, 'end time'),
                (ctypes.c_uint8, 'parts'))
 Core = _struct(
-    'Core', (_WHOLE, 'joints tracks held ticks_held faults followed recovering jumped'),
-    (_POINTER * MOST_TRACKS, 'track'), (_POINTER, 'strides body offset'),
+    'Core', (_INT, 'joints tracks held ticks_held faults followed recovering jumped'),
+    (_POINTER * MAX_TRACKS, 'track'), (_POINTER, 'strides body offset'),
     (_POINTER * 3, 'limits'),
     (_POINTER, 'found position velocity wanted rate last_rate goal correction jump jump_rate '
                'behind'), (Ramp, 'ramp approach'),
-    (_REAL, 'slowing slower frequency frequency_scale substep absorbed fraction stall stall_past '
-            'stall_low'), (_POINTER, 'legs state'), (_REAL, 'go'), (_POINTER, 'waiting'))
+    (_DOUBLE, 'slowing slower frequency frequency_scale substep absorbed fraction stall '
+              'stall_past stall_low'),
+    (_POINTER, 'legs state'), (_DOUBLE, 'go'), (_POINTER, 'waiting'))
 
 _FUNCTIONS: dict[str, tuple[Any, ...]] = {
-    'cpg_advance': (_POINTER, _REAL), 'cpg_plan': (_POINTER, _REAL),
-    'cpg_move': (_POINTER, _REAL, ctypes.c_int), 'cpg_resume': (_POINTER, _REAL),
-    'cpg_ramp_to': (_POINTER, _REAL, _REAL), 'cpg_approach_stand': (_POINTER, _REAL),
-    'cpg_reach': (_POINTER, _REAL), 'cpg_let_go': (_POINTER, _REAL),
+    'cpg_advance': (_POINTER, _DOUBLE), 'cpg_plan': (_POINTER, _DOUBLE),
+    'cpg_move': (_POINTER, _DOUBLE, ctypes.c_int), 'cpg_resume': (_POINTER, _DOUBLE),
+    'cpg_ramp_to': (_POINTER, _DOUBLE, _DOUBLE), 'cpg_approach_stand': (_POINTER, _DOUBLE),
+    'cpg_reach': (_POINTER, _DOUBLE), 'cpg_let_go': (_POINTER, _DOUBLE),
     'cpg_report': (_POINTER,) * 3,
     'cpg_feet': (_POINTER,) * 3, 'cpg_pose': (_POINTER, _POINTER, _POINTER, ctypes.c_int),
-    'cpg_track_look': (_POINTER, _REAL),
-    'cpg_track_advance': (_POINTER, _REAL), 'cpg_track_reseed': (_POINTER, _REAL),
-    'cpg_steer': (_POINTER, _REAL),
-    'cpg_confine': (ctypes.c_int, *[_POINTER] * 3, _REAL, *[_POINTER] * 3)}
+    'cpg_track_look': (_POINTER, _DOUBLE),
+    'cpg_track_advance': (_POINTER, _DOUBLE), 'cpg_track_reseed': (_POINTER, _DOUBLE),
+    'cpg_steer': (_POINTER, _DOUBLE),
+    'cpg_confine': (ctypes.c_int, *[_POINTER] * 3, _DOUBLE, *[_POINTER] * 3)}
 
 
 def _sources() -> dict[str, str]:
     """Return the core's files, name -> text."""
-    defines = (f'#define CPG_TRACKS {MOST_TRACKS}\n#define CPG_ANGLES {TABLE}\n'
-               f'#define HOLD {HOLD!r}')
+    defines = (f'#define CPG_TRACKS {MAX_TRACKS}\n#define CPG_ANGLES {TABLE_SIZE}\n'
+               f'#define HOLD {HOLD_TIME!r}')
     names = ('host_watch', 'joints', 'waveform', 'host_phases', 'phase', 'steering', 'body',
              'host_track', 'pattern', 'host')
     # Both readouts stand in it.
@@ -115,7 +116,7 @@ def core() -> ctypes.CDLL:
         function = getattr(library, name)
         function.argtypes = types
         if name not in ('cpg_track_advance', 'cpg_confine'):
-            function.restype = _REAL if name == 'cpg_pose' else None
+            function.restype = _DOUBLE if name == 'cpg_pose' else None
     return library
 
 

@@ -31,15 +31,16 @@ from cpg_ros.motion.rotations import rotation, rotation_about
 import numpy as np
 
 #: Kinds of joints that turn, which a cell can drive.
-TURNING = ('revolute', 'continuous')
+REVOLUTE_TYPES = ('revolute', 'continuous')
 #: Limits of commands in a ros2_control part, by interface and parameter.
-COMMANDED = {('position', 'min'): 'lower', ('position', 'max'): 'upper',
+COMMAND_LIMITS = {('position', 'min'): 'lower', ('position', 'max'): 'upper',
              ('velocity', 'max'): 'velocity'}
-#: END: fraction of the reach of a leg's last link beyond which its points belong to the foot.
-END = 0.97
-#: SLOW, FASTEST: speed limits, rad/s, below and above which a model's limit is doubted; SERVOS:
-#: text for that message.
-SLOW, FASTEST, SERVOS = 5.0, 100.0, 'hobby servos reach about 5 to 10 rad/s'
+#: FOOT_FRACTION: fraction of the reach of a leg's last link beyond which its points belong to the
+#: foot.
+FOOT_FRACTION = 0.97
+#: MIN_SPEED, MAX_SPEED: speed limits, rad/s, below and above which a model's limit is doubted;
+#: SERVO_SPEEDS: text for that message.
+MIN_SPEED, MAX_SPEED, SERVO_SPEEDS = 5.0, 100.0, 'hobby servos reach about 5 to 10 rad/s'
 
 
 class DescriptionError(CpgError):
@@ -54,7 +55,7 @@ class JointDescription:
         name: as in the file.
         kind: as in URDF: revolute, continuous, prismatic, fixed, ...
         lower, upper: limits, rad (m for a prismatic joint), infinite where there are none.
-        velocity: limit, rad/s, infinite where the file gives none, 0 or more than FASTEST.
+        velocity: limit, rad/s, infinite where the file gives none, 0 or more than MAX_SPEED.
         mimic: joint that it follows, '' for none.
         parent, child: links.
         xyz, rpy: pose in the parent, m and rad.
@@ -83,7 +84,7 @@ class JointDescription:
             return f"follows '{self.mimic}' (mimic)"
         if self.passive:
             return 'has no motor'
-        return '' if self.kind in TURNING else f'is {self.kind}'
+        return '' if self.kind in REVOLUTE_TYPES else f'is {self.kind}'
 
 
 @dataclass(frozen=True)
@@ -227,7 +228,7 @@ class RobotDescription:
         reach = points - begin
         furthest = reach[np.linalg.norm(reach, axis=1).argmax()]
         along = reach @ furthest
-        end = points[along >= END * along.max()]
+        end = points[along >= FOOT_FRACTION * along.max()]
         return 0.5 * (end.min(axis=0) + end.max(axis=0)), 0.0
 
     def shapes(self, last: str) -> np.ndarray:
@@ -395,11 +396,11 @@ def _passive(tree: Element, joints: Mapping[str, JointDescription]) -> list[str]
 
 def _controlled(element: Element, joint: JointDescription) -> JointDescription:
     """Narrow a joint's limits to those of its command interfaces in the ros2_control part."""
-    limits = {key: getattr(joint, key) for key in COMMANDED.values()}
+    limits = {key: getattr(joint, key) for key in COMMAND_LIMITS.values()}
     for interface in element.iterfind('command_interface'):
         for param in interface.iterfind('param'):
             value = numbers(param.text or '', 1)
-            key = COMMANDED.get((interface.get('name', ''), param.get('name', '')))
+            key = COMMAND_LIMITS.get((interface.get('name', ''), param.get('name', '')))
             if value and key:
                 narrower = max if key == 'lower' else min
                 limits[key] = narrower(limits[key], *value)
@@ -461,7 +462,7 @@ def _joint(element: Element, source: str) -> JointDescription:
     bounded &= lower != 0.0 or upper != 0.0
     return JointDescription(
         name, kind, lower if bounded else -math.inf, upper if bounded else math.inf,
-        abs(velocity) if 0.0 < abs(velocity) <= FASTEST else math.inf, text('mimic', 'joint'),
+        abs(velocity) if 0.0 < abs(velocity) <= MAX_SPEED else math.inf, text('mimic', 'joint'),
         text('parent', 'link'), text('child', 'link'), read('origin', 'xyz', '0 0 0'),
         read('origin', 'rpy', '0 0 0'), read('axis', 'xyz', '1 0 0'))
 
@@ -502,8 +503,9 @@ def _shapes(collision: Element, path: Path | None, folder: str, xyz: tuple[float
 
 # Legs that reach to the side, as those of insects.
 
-#: ACROSS: component of the femur's axis across the body from which on it swings the leg forward.
-ACROSS = 0.9
+#: MIN_PITCH_COSINE: component of the femur's axis across the body from which on it swings the leg
+#: forward.
+MIN_PITCH_COSINE = 0.9
 
 
 def sprawls(axes: np.ndarray) -> bool:
@@ -517,7 +519,7 @@ def sprawls(axes: np.ndarray) -> bool:
         return False
     coxa, femur, tibia = axes[-3:]
     return bool(abs(coxa[2]) > 0.99 and max(abs(femur[2]), abs(tibia[2])) < 0.01
-                and abs(femur @ tibia) > 0.99 and abs(femur[1]) < ACROSS)
+                and abs(femur @ tibia) > 0.99 and abs(femur[1]) < MIN_PITCH_COSINE)
 
 
 def outward(axis: np.ndarray, reach: np.ndarray) -> np.ndarray:

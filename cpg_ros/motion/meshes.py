@@ -26,9 +26,9 @@ from cpg_ros.common.errors import CpgError
 from cpg_ros.common.files import one_line, parse, read_bytes
 import numpy as np
 
-#: MOST: most points, and most triangles, of a Collada file, which can place a mesh any number of
-#: times; MOST_NUMBERS: most numbers in one of its lists.
-MOST, MOST_NUMBERS = 2_000_000, 6_000_000
+#: MAX_POINTS: most points, and most triangles, of a Collada file, which can place a mesh any
+#: number of times; MAX_NUMBERS: most numbers in one of its lists.
+MAX_POINTS, MAX_NUMBERS = 2_000_000, 6_000_000
 
 
 class MeshError(CpgError):
@@ -116,7 +116,7 @@ def _collada(root: Element) -> Mesh:
     scale = float(unit.get('meter', 1.0)) if unit is not None else 1.0
     meshes = {geometry.get('id', ''): _geometry(geometry) for geometry in root.iter('geometry')}
     parts: list[Mesh] = []
-    left = [MOST]
+    left = [MAX_POINTS]
     for node in root.iterfind('.//visual_scene/node'):
         _add(node, np.eye(4), meshes, parts, left)
     parts = parts or list(meshes.values()) or [Mesh(np.empty((0, 3)), np.empty((0, 3), int))]
@@ -142,8 +142,8 @@ def _geometry(geometry: Element) -> Mesh:
             numbers = '' if source is None else source.findtext('float_array', '')
             points.append(_numbers(numbers, float).reshape(-1, 3))
             count += len(points[-1])
-            if count > MOST:
-                raise ValueError(f'a mesh has more than {MOST} points')
+            if count > MAX_POINTS:
+                raise ValueError(f'a mesh has more than {MAX_POINTS} points')
     for kind in ('triangles', 'polylist', 'polygons'):
         for element in geometry.iter(kind):
             inputs = {use.get('semantic'): use for use in element.findall('input')}
@@ -166,8 +166,8 @@ def _geometry(geometry: Element) -> Mesh:
 def _numbers(text: str | None, kind: type) -> np.ndarray:
     """Return the numbers of a list."""
     text = text or ''
-    if sum(map(text.count, ' \t\r\n')) > MOST_NUMBERS:
-        raise ValueError(f'a list has more than {MOST_NUMBERS} numbers')
+    if sum(map(text.count, ' \t\r\n')) > MAX_NUMBERS:
+        raise ValueError(f'a list has more than {MAX_NUMBERS} numbers')
     return np.array(text.split(), dtype=kind)
 
 
@@ -193,7 +193,7 @@ def _add(node: Element, above: np.ndarray, meshes: dict[str, Mesh], parts: list[
         if mesh is not None:
             left[0] -= len(mesh.points) + len(mesh.triangles) + 1
             if left[0] < 0:
-                raise ValueError(f'its meshes have more than {MOST} points and triangles')
+                raise ValueError(f'its meshes have more than {MAX_POINTS} points and triangles')
             parts.append(Mesh(mesh.points @ transform[:3, :3].T + transform[:3, 3],
                               mesh.triangles))
     for below in node.findall('node'):

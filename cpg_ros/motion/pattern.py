@@ -27,18 +27,19 @@ from typing import Any
 
 from cpg_ros.dynamics.integration.stepper import Stepper
 from cpg_ros.motion.body_pose import BodyPose
-from cpg_ros.motion.core import Core, core, CTrack, HOLD, MOST_TRACKS
+from cpg_ros.motion.core import Core, core, CTrack, HOLD_TIME, MAX_TRACKS
 from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.motion.strides import smoothstep, StrideCommand
 import numpy as np
 
-__all__ = ['HOLD', 'SUBSTEP', 'GaitRunner', 'Pattern']
+__all__ = ['HOLD_TIME', 'SUBSTEP', 'GaitRunner', 'Pattern']
 
-#: SETTLING: strides in which the network has to find its new gait after a transition of 0 s.
-SETTLING = 40.0
-#: KICK: least amplitude of the new gait in the state when such a transition starts, as a fraction
-#: of the full gait's.
-KICK = 0.05
+#: SETTLING_STRIDES: strides in which the network has to find its new gait after a transition of 0
+#: s.
+SETTLING_STRIDES = 40.0
+#: MIN_AMPLITUDE: least amplitude of the new gait in the state when such a transition starts, as a
+#: fraction of the full gait's.
+MIN_AMPLITUDE = 0.05
 
 
 def shared(name: str, struct: str = '_struct') -> Any:
@@ -135,9 +136,9 @@ class GaitRunner:
         mean, basis = plan.wave
         at = (self.phase - plan.readout.start) % 1.0 * orbit.period
         state, target = stepper.newest() - mean, orbit(np.array(at)) - mean
-        if np.linalg.norm(basis @ state) < KICK * np.linalg.norm(basis @ target):
-            stepper.superpose(lambda times: KICK * (orbit(at + times) - mean),
-                              lambda times: KICK * orbit.derivative(at + times))
+        if np.linalg.norm(basis @ state) < MIN_AMPLITUDE * np.linalg.norm(basis @ target):
+            stepper.superpose(lambda times: MIN_AMPLITUDE * (orbit(at + times) - mean),
+                              lambda times: MIN_AMPLITUDE * orbit.derivative(at + times))
         # Advance to the node at which the change was made, so that all of it shows at once.
         stepper.advance(stepper.ahead)
         self._start_on(plan)
@@ -145,14 +146,15 @@ class GaitRunner:
         self._core.cpg_track_look(self.address, 0.0)
         self.phase, self._struct.phase_carry = float(self.legs[0]), 0.0
         self._struct.astray = self._struct.calm = self._struct.still = 0.0
-        self.settling = SETTLING
+        self.settling = SETTLING_STRIDES
 
 
 #: SUBSTEP: longest step of cross-fades and ramps, s, whatever the tick.
 SUBSTEP = 1e-3
-#: SHORTEST: least duration of a ramp or cross-fade, s. The clock adapts from substep to substep: a
-#: joint that accelerated within a single one would exceed its speed limit before the clock slows.
-SHORTEST = 0.05
+#: MIN_DURATION: least duration of a ramp or cross-fade, s. The clock adapts from substep to
+#: substep: a joint that accelerated within a single one would exceed its speed limit before the
+#: clock slows.
+MIN_DURATION = 0.05
 
 
 class Pattern:
@@ -232,7 +234,7 @@ class Pattern:
         """Keep a runner alive as long as the core may run it."""
         waiting = self._struct.waiting
         used = {waiting, track.address, *(runner.address for runner in self._tracks)}
-        for old in list(self._runners)[:-2 * MOST_TRACKS]:
+        for old in list(self._runners)[:-2 * MAX_TRACKS]:
             if old not in used:
                 del self._runners[old]
         self._runners[track.address] = track
@@ -304,7 +306,7 @@ class Pattern:
         It replaces a plan that still waits.
         """
         # Seeding an orbit takes long: do it in the caller's thread, not in that of the ticks.
-        prepared = GaitRunner(plan, max(transition, SHORTEST), self.strides)
+        prepared = GaitRunner(plan, max(transition, MIN_DURATION), self.strides)
         self._keep(prepared)
         if transition > 0.0:
             self._drift.clear()
@@ -317,7 +319,7 @@ class Pattern:
     def enable(self, enabled: bool, ramp: float) -> None:
         """Ramp into the gait, or down to the stand, over a time in s."""
         self.enabled = enabled
-        self._struct.go = math.copysign(max(ramp, SHORTEST), 1.0 if enabled else -1.0)
+        self._struct.go = math.copysign(max(ramp, MIN_DURATION), 1.0 if enabled else -1.0)
 
     def steer(self, stride: np.ndarray, pace: float) -> None:
         """Request strides of the legs, shape (legs,), and the pace; see StrideCommand.

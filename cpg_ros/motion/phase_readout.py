@@ -28,14 +28,14 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 from cpg_ros.dynamics.orbit import Orbit
-from cpg_ros.motion.readout import DrivenJoints, NoPhase, over_cycle, stance, TURN, WaveReadout
+from cpg_ros.motion.readout import DrivenJoints, NoPhase, over_cycle, stance, TWO_PI, WaveReadout
 import numpy as np
 
 #: POINTS: points of a cycle in the tables of an orbit; a cell may jump within 0.01 cycles.
 POINTS = 4096
-#: LEAST_FRACTION: least fraction of the first harmonic in a waveform's variance for a phase to be
+#: MIN_FRACTION: least fraction of the first harmonic in a waveform's variance for a phase to be
 #: read.
-LEAST_FRACTION = 0.1
+MIN_FRACTION = 0.1
 
 
 class PhaseMap(NamedTuple):
@@ -102,7 +102,7 @@ def evaluate(terms: np.ndarray, theta: np.ndarray, order: int = 0) -> np.ndarray
     """Return x, or its derivative by phase in radians of order 1 or 2, at phases in cycles."""
     k = np.arange(terms.shape[0])
     complex_terms = (terms[:, 0] - 1j * terms[:, 1]) * (1j * k)**order
-    return (np.exp(TURN * 1j * np.multiply.outer(theta, k)) @ complex_terms).real
+    return (np.exp(TWO_PI * 1j * np.multiply.outer(theta, k)) @ complex_terms).real
 
 
 @lru_cache(maxsize=64)
@@ -124,9 +124,9 @@ def phase_map(orbit: Orbit, harmonics: int) -> PhaseMap:
         states = (states - mean) / half
         first = 2.0 * np.fft.rfft(states, axis=0)[1] / POINTS
         square = 0.5 * (np.abs(first)**2).sum()
-        if square < LEAST_FRACTION * (states**2).mean(axis=0).sum():
+        if square < MIN_FRACTION * (states**2).mean(axis=0).sum():
             raise NoPhase('its waveform repeats within a cycle: the first harmonic, by which its '
-                          f'phase is followed, has less than {LEAST_FRACTION:.0%} of it')
+                          f'phase is followed, has less than {MIN_FRACTION:.0%} of it')
         maps.shape[wave] = *mean, *half
         maps.circles[wave] = np.stack([first.real, -first.imag], axis=1).ravel() / square
         maps.tables[wave] = np.hstack([states, slopes / half / POINTS])
@@ -187,14 +187,14 @@ def _crest(terms: np.ndarray) -> float:
     crest = float(grid[evaluate(terms, grid).argmax()])
     for _ in range(4):
         slope, bend = (float(evaluate(terms, np.array(crest), order)) for order in (1, 2))
-        crest -= float(np.clip(slope / bend / TURN, -1 / 512, 1 / 512)) if bend else 0.0
+        crest -= float(np.clip(slope / bend / TWO_PI, -1 / 512, 1 / 512)) if bend else 0.0
     return crest % 1.0
 
 
 # The readout of a network's joints: of the waveform or of the phase, as the network states.
 
-#: GRID: phases at which troughs are searched for, cycles.
-GRID = np.arange(1024) / 1024
+#: PHASES: phases at which troughs are searched for, cycles.
+PHASES = np.arange(1024) / 1024
 
 
 def joint_readout(orbit: Orbit, cells: np.ndarray, weights: np.ndarray, leg_cells: np.ndarray,
@@ -227,9 +227,9 @@ def standing(orbit: Orbit, leg_cells: np.ndarray, harmonics: int
     begin, fraction = np.empty((2, len(leg_cells)))
     for leg, cell in enumerate(leg_cells):
         if orbit.network.readout == 'waveform':
-            begin[leg], fraction[leg] = 0.0, stance(orbit.waveform(GRID), 0.0)
+            begin[leg], fraction[leg] = 0.0, stance(orbit.waveform(PHASES), 0.0)
             continue
         maps, wave = phase_map(orbit, harmonics), orbit.waves[cell]
         begin[leg] = maps.crests[wave]
-        fraction[leg] = stance(evaluate(maps.terms[wave], GRID), float(begin[leg]))
+        fraction[leg] = stance(evaluate(maps.terms[wave], PHASES), float(begin[leg]))
     return begin, fraction

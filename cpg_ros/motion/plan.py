@@ -34,8 +34,8 @@ import numpy as np
 
 # Obstacles: reasons why the generator cannot run a gait on any robot.
 
-#: STEPS_A_PERIOD: fewest steps of a period with which the integrator stays on the orbit.
-STEPS_A_PERIOD = 40
+#: MIN_STEPS: fewest steps of a period with which the integrator stays on the orbit.
+MIN_STEPS = 40
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ def rejection(orbit: Orbit, assessed: Stability, harmonics: int) -> Rejection | 
         harmonics: number of harmonics of a Morris-Lecar cell's waveform that joints follow.
 
     """
-    shortest = STEPS_A_PERIOD * orbit.network.step
+    shortest = MIN_STEPS * orbit.network.step
     if orbit.period < shortest:
         period = f'period of {orbit.period:.3g} model time units'
         return Rejection(f'has a {period}, too short for steps of {orbit.network.step}: at least '
@@ -79,12 +79,13 @@ def rejection(orbit: Orbit, assessed: Stability, harmonics: int) -> Rejection | 
     return None
 
 
-#: AT_REST: fraction of a cell's range below which its change in a stride counts as rest.
-AT_REST = 0.05
-#: SLOWEST: least stride frequency, Hz; slower strides would look like a stand.
-SLOWEST = 0.01
-#: SAME: relative difference up to which the periods of two solutions are those of one orbit.
-SAME = 1e-6
+#: REST_FRACTION: fraction of a cell's range below which its change in a stride counts as rest.
+REST_FRACTION = 0.05
+#: MIN_FREQUENCY: least stride frequency, Hz; slower strides would look like a stand.
+MIN_FREQUENCY = 0.01
+#: PERIOD_RTOL: relative difference up to which the periods of two solutions are those of one
+#: orbit.
+PERIOD_RTOL = 1e-6
 
 
 class PlanError(CpgError):
@@ -165,7 +166,7 @@ class GaitPlan(ShortRepr):
         return CGait(**{
             **self.readout.fields(), 'frequency': self.frequency, 'period': orbit.period,
             'start': self.readout.start, 'components': orbit.network.components,
-            'least': AT_REST * float(orbit.levels[0, 0, 1]), 'shift': self.shift,
+            'least': REST_FRACTION * float(orbit.levels[0, 0, 1]), 'shift': self.shift,
             'speed': self.speed, 'joint_leg': self.robot.leg_of_joint,
             'in_place': self.in_place.joints.weights})
 
@@ -281,7 +282,7 @@ def validate_orbit(orbit: Orbit, gait: str, harmonics: int) -> str:
         reached, assessed = gait_of(orbit.network.presets()[gait], orbit.network)
     except CpgError as error:
         return f'from its preset it is not found: {error}'
-    if abs(reached.period / orbit.period - 1.0) > SAME:
+    if abs(reached.period / orbit.period - 1.0) > PERIOD_RTOL:
         return (f'its preset leads to another orbit, of period {reached.period:.6g} instead of '
                 f'{orbit.period:.6g}')
     reason = rejection(reached, assessed, harmonics)
@@ -309,8 +310,8 @@ def plan(robot: Robot, name: str, preset: Preset, network: Network, frequency: f
 
     """
     gait = preset.gait
-    if 0.0 < frequency < SLOWEST:
-        raise PlanError(f'frequency {frequency:g} is neither 0 nor at least {SLOWEST:g} Hz')
+    if 0.0 < frequency < MIN_FREQUENCY:
+        raise PlanError(f'frequency {frequency:g} is neither 0 nor at least {MIN_FREQUENCY:g} Hz')
     if network.longest_delay and not network.step <= network.delay <= network.longest_delay:
         raise PlanError(f'{network.delay_parameter} {network.delay:g} must be from {network.step} '
                         f'to {network.longest_delay:g}')

@@ -24,13 +24,13 @@ from typing import Any, NamedTuple
 
 from cpg_ros.common.errors import CpgError, InputError
 from cpg_ros.dynamics.orbit import Orbit
-from cpg_ros.motion.core import TABLE
+from cpg_ros.motion.core import TABLE_SIZE
 import numpy as np
 
 # The duty factor: how much of a stride a leg stands, whatever its network does.
 
-#: LEAST, MOST: smallest and largest duty factor that can be set.
-LEAST, MOST = 0.3, 0.9
+#: MIN_DUTY, MAX_DUTY: smallest and largest duty factor that can be set.
+MIN_DUTY, MAX_DUTY = 0.3, 0.9
 
 
 def retimed_phase(phase, k, centre, own):
@@ -87,12 +87,12 @@ class Duty:
             fractions: wanted duty factors, shape (legs,).
 
         Raises:
-            InputError: a fraction is not from LEAST to MOST.
+            InputError: a fraction is not from MIN_DUTY to MAX_DUTY.
 
         """
         for fraction in fractions[fractions != own]:
-            if not LEAST <= fraction <= MOST:
-                raise InputError(f'duty {fraction:g} is not from {LEAST:g} to {MOST:g}')
+            if not MIN_DUTY <= fraction <= MAX_DUTY:
+                raise InputError(f'duty {fraction:g} is not from {MIN_DUTY:g} to {MAX_DUTY:g}')
         self.fractions = fractions
         self._phases, self._leg_cells = orbit.phases, leg_cells
         k = np.tan(0.5 * math.pi * own) / np.tan(0.5 * math.pi * fractions)
@@ -114,7 +114,7 @@ class Duty:
 
 # The polynomial by which a joint follows its cell: its weights, its value and its rate.
 
-TURN = 2.0 * math.pi
+TWO_PI = 2.0 * math.pi
 
 
 class DrivenJoints(NamedTuple):
@@ -150,7 +150,7 @@ def monomials(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, 
 
     """
     values = np.stack([x, y, x * x, x * y, x**3, x * x * y])
-    slopes = TURN * np.stack([y, z, 2 * x * y, y * y + x * z, 3 * x * x * y,
+    slopes = TWO_PI * np.stack([y, z, 2 * x * y, y * y + x * z, 3 * x * x * y,
                               2 * x * y * y + x * x * z])
     return values, slopes
 
@@ -226,17 +226,17 @@ def tables(orbit: Orbit) -> tuple[np.ndarray, np.ndarray]:
     grid = np.arange(POINTS) / POINTS
 
     def unit(theta: np.ndarray) -> tuple[np.ndarray, ...]:
-        return tuple(orbit.waveform(theta, n) / (TURN**n * orbit.peak) for n in range(3))
+        return tuple(orbit.waveform(theta, n) / (TWO_PI**n * orbit.peak) for n in range(3))
 
     x, y, z = unit(grid)
-    cycle = np.stack([x, y * TURN / POINTS, y, z * TURN / POINTS], axis=1)
-    angle = np.unwrap(np.arctan2(-y, x)) / TURN
+    cycle = np.stack([x, y * TWO_PI / POINTS, y, z * TWO_PI / POINTS], axis=1)
+    angle = np.unwrap(np.arctan2(-y, x)) / TWO_PI
     angle -= np.round(angle[0])
     # Phases at even angles, by Newton's method from what lies between the entries.
     theta = np.interp(grid, np.append(angle, angle[0] + 1.0), np.append(grid, 1.0))
     for _ in range(4):
         x, y, z = unit(theta)
-        gap = (np.arctan2(-y, x) / TURN - grid + 0.5) % 1.0 - 0.5
+        gap = (np.arctan2(-y, x) / TWO_PI - grid + 0.5) % 1.0 - 0.5
         slope = (y * y - x * z) / (x * x + y * y)
         theta = theta - gap / slope
     x, y, z = unit(theta)
@@ -260,11 +260,11 @@ def phase_offsets(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
     """
     phase = np.arange(x.size + 1) / x.size
-    angle = np.unwrap(np.arctan2(-np.append(y, y[0]), np.append(x, x[0]))) / TURN
+    angle = np.unwrap(np.arctan2(-np.append(y, y[0]), np.append(x, x[0]))) / TWO_PI
     angle -= angle[0]
     if not (np.diff(angle) > 0.0).all() or abs(angle[-1] - 1.0) > 1e-9:
         raise NoPhase('the waveform has more than one hump a cycle')
-    grid = np.arange(TABLE) / TABLE
+    grid = np.arange(TABLE_SIZE) / TABLE_SIZE
     return np.interp(grid, angle, phase) - grid
 
 
@@ -296,10 +296,10 @@ class WaveReadout:
             NoPhase: the waveform does not determine the phase.
 
         """
-        theta = np.arange(TABLE) / TABLE
+        theta = np.arange(TABLE_SIZE) / TABLE_SIZE
         x = orbit.waveform(theta) / orbit.peak
-        y = orbit.waveform(theta, 1) / (TURN * orbit.peak)
-        z = orbit.waveform(theta, 2) / (TURN**2 * orbit.peak)
+        y = orbit.waveform(theta, 1) / (TWO_PI * orbit.peak)
+        z = orbit.waveform(theta, 2) / (TWO_PI**2 * orbit.peak)
         self.wave = Waveform(orbit.peak, orbit.period, orbit.phases, x, phase_offsets(x, y))
         self.joints = DrivenJoints(cells, weights, leg_cells)
         self.start = float(orbit.phases[leg_cells[0]])
@@ -310,7 +310,8 @@ class WaveReadout:
             return
         self.retiming = Retiming(*tables(orbit), maps)
         self.angles, self.rises = over_cycle(weights, lambda _, phase: tuple(
-            orbit.waveform(phase, n) / (TURN**n * orbit.peak) for n in range(3)), maps, TABLE)
+            orbit.waveform(phase, n) / (TWO_PI**n * orbit.peak) for n in range(3)),
+                                              maps, TABLE_SIZE)
 
     def fields(self) -> dict[str, Any]:
         """Return the fields by which the core reads joints and legs, see core.CGait."""

@@ -33,10 +33,11 @@ from cpg_ros.networks.registry import NETWORKS
 import numpy as np
 
 #: Default number of harmonics of a Morris-Lecar cell that joints follow.
-HARMONICS = 3
+NUM_HARMONICS = 3
 
-#: WEIGHTS: numbers of weights of the readouts: of a bare scale, and of the orders 1, 2 and 3.
-WEIGHTS = (1, 2, 4, 6)
+#: WEIGHT_COUNTS: numbers of weights of the readouts: of a bare scale, and of the orders 1, 2 and
+#: 3.
+WEIGHT_COUNTS = (1, 2, 4, 6)
 
 
 @dataclass(frozen=True)
@@ -226,7 +227,7 @@ class Robot(ShortRepr):
             in_place: return the weights at a stride of 0.
 
         """
-        table = np.zeros((len(self.joints), WEIGHTS[-1]))
+        table = np.zeros((len(self.joints), WEIGHT_COUNTS[-1]))
         for row, joint in zip(table, self.joints, strict=True):
             moved = (motion or Motion()).joints.get(joint.name)
             listed = moved or JointMotion(joint.offset, joint.weights)
@@ -252,8 +253,8 @@ class Robot(ShortRepr):
 
 # A gait's readout as one list for each joint: its offset, then its weights, rad.
 
-#: READOUT: prefix of the generator's parameters of readouts; the joint's name follows.
-READOUT = 'readout.'
+#: READOUT_PREFIX: prefix of the generator's parameters of readouts; the joint's name follows.
+READOUT_PREFIX = 'readout.'
 
 
 def gait_readouts(robot: Robot, motion: Motion) -> dict[str, tuple[float, ...]]:
@@ -287,9 +288,9 @@ def with_readouts(robot: Robot, preset: str, gait: str,
     joints = {}
     for name, (offset, *weights) in ((name, [*row] or [math.nan])
                                      for name, row in readouts.items()):
-        if len(weights) not in WEIGHTS or not all(map(math.isfinite, (offset, *weights))):
-            raise InputError(f'{READOUT}{name} must be an offset and 1, 2, 4 or 6 weights in rad, '
-                             f'not {list(readouts[name])}')
+        if len(weights) not in WEIGHT_COUNTS or not all(map(math.isfinite, (offset, *weights))):
+            raise InputError(f'{READOUT_PREFIX}{name} must be an offset and 1, 2, 4 or 6 weights '
+                             f'in rad, not {list(readouts[name])}')
         own = motion.joints.get(name)
         joints[name] = JointMotion(offset, tuple(weights), own.in_place if own else ())
     return replace(robot, motions={**robot.motions, preset: replace(motion, joints=joints)})

@@ -35,23 +35,23 @@ from cpg_ros.motion.body_file import (
     read_geometry,
 )
 from cpg_ros.motion.robot import (
-    HARMONICS,
     Joint,
     JointMotion,
     Motion,
+    NUM_HARMONICS,
     Robot,
     SteeringTable,
-    WEIGHTS,
+    WEIGHT_COUNTS,
 )
 from cpg_ros.networks.leg_numbers import GIRDLES
 from cpg_ros.networks.registry import find_network, NetworkError, NETWORKS, reference
 
-#: HASTE: largest frequency of a steered gait, as a multiple of the gait's own.
-HASTE = 2.0
+#: MAX_FREQUENCY_RATIO: largest frequency of a steered gait, as a multiple of the gait's own.
+MAX_FREQUENCY_RATIO = 2.0
 #: Limits of a joint.
 LIMITS = ('lower', 'upper', 'velocity')
-#: LARGEST: largest number that a robot file may state, such as an angle, rad, or speed, rad/s.
-LARGEST = 1e6
+#: MAX_NUMBER: largest number that a robot file may state, such as an angle, rad, or speed, rad/s.
+MAX_NUMBER = 1e6
 
 
 class RobotError(CpgError):
@@ -114,7 +114,7 @@ class _Reader(YamlReader):
         return self.weights(tree['weights'], f'{where}.weights')
 
     def weights(self, value: Any, where: str) -> tuple[float, ...]:
-        if len(self.items(value, where)) not in WEIGHTS:
+        if len(self.items(value, where)) not in WEIGHT_COUNTS:
             raise self.fail(where, f'takes 1, 2, 4 or 6 numbers (x, y, x^2, x y, x^3, x^2 y), '
                             f'not {len(value)}')
         return self.numbers(value, where)
@@ -157,7 +157,7 @@ class _Reader(YamlReader):
                 raise self.fail(f'{where}.{key}', f'has {len(column)} numbers, and speed has '
                                 f'{len(table.speed)}')
         self.numbers(list(table.frequency), f'{where}.frequency', check=within(
-            0.01, HASTE * fastest, f"0.01 to twice the gait's {fastest:g} Hz"))
+            0.01, MAX_FREQUENCY_RATIO * fastest, f"0.01 to twice the gait's {fastest:g} Hz"))
         self.check_rising(table.speed, f'{where}.speed')
         return table
 
@@ -170,7 +170,7 @@ def read_robot(path: str | Path) -> Robot:
 
     """
     path = Path(path)
-    reader = _Reader(path, 'robot file', RobotError, LARGEST)
+    reader = _Reader(path, 'robot file', RobotError, MAX_NUMBER)
     tree = reader.keys(reader.tree(), 'file', {'network', 'legs'},
                        {'joint_order', 'assignment', 'harmonics', 'geometry', 'biped',
                         'feedback', 'gaits'})
@@ -183,7 +183,7 @@ def read_robot(path: str | Path) -> Robot:
                               f'{", ".join(NETWORKS[name].legs)}')
         if not _alike(NETWORKS[name].legs[assignment], first.legs[assignment]):
             raise reader.fail('network', f"'{name}' has other legs or cells than '{networks[0]}'")
-    harmonics = tree.get('harmonics', HARMONICS)
+    harmonics = tree.get('harmonics', NUM_HARMONICS)
     if type(harmonics) is not int or not 1 <= harmonics <= 32:
         raise reader.fail('harmonics', f'must be a whole number from 1 to 32, not '
                           f'{quoted(harmonics)}')

@@ -22,7 +22,7 @@ from typing import Any
 from cpg_ros.common.errors import CpgError
 from cpg_ros.feedback.laws.stiffen import LAW
 from cpg_ros.motion.robot import Robot
-from cpg_ros.motion.robot_file import LARGEST
+from cpg_ros.motion.robot_file import MAX_NUMBER
 from cpg_ros.ros.generator_io import COMMAND_TOPICS, joint_state
 from cpg_ros.ros.node.message_block import indices, MessageBlock, Template
 from cpg_ros.ros.node.parameters import Spec
@@ -303,6 +303,6 @@ class Commands:
     def _write(self, topic: str, names: Sequence[str], slots: Any, values: Sequence[float]
                ) -> None:
         for name, value in zip(names, values, strict=True):
-            if not abs(value) <= LARGEST:
+            if not abs(value) <= MAX_NUMBER:
                 raise _Bad(f"{topic}: joint '{name}' at {value}")
         self.angles[slots] = values

@@ -26,7 +26,7 @@ from cpg_ros.common.errors import CpgError, InputError
 from cpg_ros.feedback.biped.gains import BipedGains
 from cpg_ros.motion.body_file import GAIT_SPEEDS
 from cpg_ros.motion.plan import gait_of, GaitPlan, plan, PlanError
-from cpg_ros.motion.robot import gait_readouts, READOUT, Robot, with_readouts
+from cpg_ros.motion.robot import gait_readouts, READOUT_PREFIX, Robot, with_readouts
 from cpg_ros.motion.robot_file import load_robot
 from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.presets import read_presets
@@ -185,7 +185,7 @@ class Planner:
         self.steered = steered
         self.names = ('gait', 'frequency', 'amplitude', 'symmetry_gain', 'duty',
                       *(f'{network.name}.{key}' for key in network.parameters()),
-                      *(READOUT + joint.name for joint in robot.joints))
+                      *(READOUT_PREFIX + joint.name for joint in robot.joints))
         self._solve = functools.lru_cache(maxsize=32)(self._plan)
 
     @property
@@ -241,7 +241,7 @@ class Planner:
     def _readouts(self, preset: str) -> dict[str, list[float]]:
         """Return the gait's readouts in the robot file, by parameter."""
         motion = self.robot.motion(preset, self.presets[preset].gait)
-        return {READOUT + name: list(readout)
+        return {READOUT_PREFIX + name: list(readout)
                 for name, readout in gait_readouts(self.robot, motion).items()}
 
     def _values(self, network: Network) -> dict[str, float]:
@@ -259,7 +259,7 @@ class Planner:
         """
         for name in self.names:
             value = values[name]
-            if name != 'gait' and not name.startswith(READOUT) and not (
+            if name != 'gait' and not name.startswith(READOUT_PREFIX) and not (
                     isinstance(value, float) and math.isfinite(value)):
                 raise PlanError(f'{name} must be a finite number, not {value!r}')
         if values['gait'] not in self.presets:
@@ -271,7 +271,7 @@ class Planner:
                                  for key in self.network.parameters()))
         return GaitSettings(values['gait'], network, values['frequency'], values['amplitude'],
                             gain, values['duty'], tuple(
-                                tuple(values[READOUT + joint.name])
+                                tuple(values[READOUT_PREFIX + joint.name])
                                 for joint in self.robot.joints))
 
     def plan(self, values: dict[str, Any]) -> GaitPlan:

@@ -19,7 +19,7 @@ import math
 from typing import Any
 
 from cpg_ros.common.errors import InputError
-from cpg_ros.motion.body_pose import POSE
+from cpg_ros.motion.body_pose import POSE_NAMES
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.motion.rotations import rpy_of
@@ -94,7 +94,7 @@ class Posture:
     def _asked(self, changes: Mapping[str, Any]) -> tuple[float, ...]:
         """Return the pose of the parameters after a batch of changes."""
         return tuple(changes.get(name, self._node.get_parameter(name).value)
-                     for name in (f'{PREFIX}{number}' for number in POSE))
+                     for name in (f'{PREFIX}{number}' for number in POSE_NAMES))
 
     def validate(self, parameters: Sequence[Parameter], plan: GaitPlan) -> str:
         """Return why a batch of changes, or a plan, is rejected, or ''."""

@@ -221,8 +221,8 @@ COLLADA = """<COLLADA><library_geometries><geometry id="g"><mesh>
     ('0 1 2', 600, 'more than 2000 points and triangles'),
     ('0 1 2 ' * 2001, 1, 'a list has more than 6000 numbers')])
 def test_a_mesh_placed_without_end(tmp_path, monkeypatch, corners, nodes, words):
-    monkeypatch.setattr(meshes, 'MOST', 2000)
-    monkeypatch.setattr(meshes, 'MOST_NUMBERS', 6000)
+    monkeypatch.setattr(meshes, 'MAX_POINTS', 2000)
+    monkeypatch.setattr(meshes, 'MAX_NUMBERS', 6000)
     path = tmp_path / 'leg.dae'
     path.write_text(COLLADA.format(corners='0 1 2', nodes=NODE * 2))
     assert len(meshes.read_mesh(path).points) == 6

@@ -16,7 +16,7 @@
 
 from functools import cache
 
-from cpg_ros.motion.pattern import HOLD, Pattern
+from cpg_ros.motion.pattern import HOLD_TIME, Pattern
 from cpg_ros.motion.plan import plan, PlanError
 from cpg_ros.motion.robot_file import load_robot
 from cpg_ros.networks.registry import PRESETS
@@ -79,7 +79,7 @@ def test_no_story_outruns_a_limit(network, rate, tolerance, story):
         getattr(pattern, name)(*arguments)
         if name in ('restart', 'resume'):
             # A new motion begins at rest, and after a stall the slower, the longer it was.
-            pace = 0.0 if name == 'restart' else max(0.0, 1.0 - arguments[0] / HOLD)
+            pace = 0.0 if name == 'restart' else max(0.0, 1.0 - arguments[0] / HOLD_TIME)
             before = before[0], pace * before[1]
         before = check(pattern, 1.0 / rate, pause, before, tolerance)
 

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 from cpg_ros.motion.phase_readout import joint_readout, standing
 from cpg_ros.motion.readout import Duty
-from cpg_ros.motion.robot import HARMONICS
+from cpg_ros.motion.robot import NUM_HARMONICS
 import numpy as np
 
 
@@ -43,11 +43,11 @@ def joint_angles(orbit, cells, weights, theta, duty=0.0):
     legs = [np.array(own) - 1 for own in next(iter(orbit.network.legs.values())).values()]
     leading = np.array([own[0] for own in legs])
     if duty:
-        of_legs = Duty(orbit, leading, *standing(orbit, leading, HARMONICS),
+        of_legs = Duty(orbit, leading, *standing(orbit, leading, NUM_HARMONICS),
                        np.full(len(legs), duty))
         maps = of_legs.of_cells(np.array([next(k for k, own in enumerate(legs) if cell in own)
                                           for cell in cells]), cells)
-    readout = joint_readout(orbit, cells, weights, leading, HARMONICS, maps)
+    readout = joint_readout(orbit, cells, weights, leading, NUM_HARMONICS, maps)
     terms = np.fft.rfft(readout.angles) / readout.angles.shape[1]
     terms[:, 1:] *= 2.0
     k = np.arange(64)

@@ -25,7 +25,7 @@ from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.feedback.input_checks import RECOVERY_TIME
 from cpg_ros.feedback.kinematics import GRAVITY
 from cpg_ros.motion.core import Core
-from cpg_ros.motion.pattern import GaitRunner, Pattern, shared, SHORTEST
+from cpg_ros.motion.pattern import GaitRunner, MIN_DURATION, Pattern, shared
 from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.motion.strides import StrideCommand
 import numpy as np
@@ -85,7 +85,7 @@ class BalancedPattern(Pattern):
     def balance(self, feedback: BipedFeedback | None) -> None:
         if feedback is None:
             if self.balance is not None and self.balance.changing:
-                super().apply(self.balance.wanted.plan, SHORTEST)
+                super().apply(self.balance.wanted.plan, MIN_DURATION)
         else:
             if feedback is not self._feedback:
                 self.prepare(feedback)
@@ -148,7 +148,7 @@ class BalancedPattern(Pattern):
     def apply(self, plan: GaitPlan, transition: float) -> None:
         """Change to a plan; with feedback at once, whatever the transition."""
         if self._feedback is not None and plan.balanced:
-            self._feedback.set_gait(GaitRunner(plan, SHORTEST))
+            self._feedback.set_gait(GaitRunner(plan, MIN_DURATION))
             self._know(self._feedback)
         if self.balance is None:
             super().apply(plan, transition)

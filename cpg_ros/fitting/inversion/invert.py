@@ -53,7 +53,7 @@ from cpg_ros.fitting.inversion.leg_duty import (
     GaitReadout,
 )
 from cpg_ros.motion.plan import validate_orbit
-from cpg_ros.motion.readout import LEAST, MOST
+from cpg_ros.motion.readout import MAX_DUTY, MIN_DUTY
 from cpg_ros.networks.network import Network
 import numpy as np
 
@@ -247,7 +247,7 @@ def _numbers(network: Network, gait: str, names: Sequence[str],
              bounds: Mapping[str, tuple[float, float]] | None) -> tuple[Free, ...]:
     """Return the free numbers, the gait's duty last."""
     own = [name for name in names if name != GAIT_DUTY]
-    duty = (Free(GAIT_DUTY, (), LEAST, MOST),) if GAIT_DUTY in names else ()
+    duty = (Free(GAIT_DUTY, (), MIN_DUTY, MAX_DUTY),) if GAIT_DUTY in names else ()
     return (free_numbers(network, gait, own, bounds) if own or not duty else ()) + duty
 
 

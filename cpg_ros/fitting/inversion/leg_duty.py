@@ -25,7 +25,7 @@ import math
 from typing import NamedTuple
 
 from cpg_ros.fitting.inversion.fit_data import Signals, TWO_PI
-from cpg_ros.motion.robot import HARMONICS, Robot
+from cpg_ros.motion.robot import NUM_HARMONICS, Robot
 from cpg_ros.networks.network import Network
 import numpy as np
 
@@ -54,7 +54,7 @@ class GaitReadout:
     leading: Mapping[int, int] = field(default_factory=dict)
     duty: float | None = None
     stance: tuple[float, float] | None = None
-    harmonics: int = HARMONICS
+    harmonics: int = NUM_HARMONICS
     weights: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     @classmethod

@@ -25,8 +25,8 @@ from cpg_ros.common.files import write_atomically
 from cpg_ros.fitting.inversion.recording_fit import RecordingFit
 from cpg_ros.motion.phase_readout import standing
 from cpg_ros.motion.plan import OutOfLimits, plan, PlanError
-from cpg_ros.motion.robot import Joint, JointMotion, Motion, READOUT, Robot, SteeringTable
-from cpg_ros.motion.robot_file import HASTE, read_robot, write_robot
+from cpg_ros.motion.robot import Joint, JointMotion, Motion, READOUT_PREFIX, Robot, SteeringTable
+from cpg_ros.motion.robot_file import MAX_FREQUENCY_RATIO, read_robot, write_robot
 from cpg_ros.networks.registry import find_network, NETWORKS, reference
 import numpy as np
 import yaml
@@ -148,7 +148,7 @@ def _slower(table: SteeringTable | None, frequency: float) -> SteeringTable | No
     if table is None:
         return None
     rows = [row for row in zip(*filter(None, astuple(table)), strict=True)
-            if row[2] <= HASTE * frequency]
+            if row[2] <= MAX_FREQUENCY_RATIO * frequency]
     return SteeringTable(*zip(*rows, strict=True)) if rows else None
 
 
@@ -184,7 +184,7 @@ def running_parameters(result: RecordingFit, robot: Robot | None = None) -> dict
            else motion.stance[1])
     duty = fit.duty or (0.0 if motion.duty is None else float(own))
     return {**settings, 'amplitude': 1.0, 'duty': duty,
-            **{READOUT + name: [float(offset), *map(float, weights)]
+            **{READOUT_PREFIX + name: [float(offset), *map(float, weights)]
                for name, (offset, weights) in fit.readouts.items()}}
 
 

@@ -27,7 +27,7 @@ from cpg_ros.motion.phase_readout import PhaseReadout
 from cpg_ros.networks.equations import equations_of
 
 SUBSTEP = 0.001
-TYPES = {'float32': 'float', 'float64': 'double'}
+C_TYPES = {'float32': 'float', 'float64': 'double'}
 
 
 class CProject:
@@ -129,7 +129,7 @@ class CProject:
     def _header(self) -> str:
         suffix = 'f' if self.data.format.real == 'float32' else ''
         return part('cpg.h', {
-            'TITLE': self.title, 'REAL': TYPES[self.data.format.real],
+            'TITLE': self.title, 'REAL': C_TYPES[self.data.format.real],
             'DEFINES': self._defines(), 'TRACKS': str(self.tracks),
             'SUBSTEP': f'{self.substep!r}{suffix}', 'RAMP': part('ramp.h')})
 
@@ -185,7 +185,7 @@ class CProject:
 
 # The README of an export: what is in it, how large it is, and how to use it.
 
-TEXT = """\
+README = """\
 # {title}
 
 Written by `{command}`. C99 without dependencies but the C library's mathematics; no memory is
@@ -226,7 +226,7 @@ for (;;) {{                          /* {rate:g} times a second */
 Call all functions from one thread, or interrupt. There is no watchdog: a state that leaves the
 orbit is not put back on it. Positions stay within their limits whatever happens.
 """
-FORMS = {
+FORM_TEXTS = {
     'network': 'The network runs with steps of {step:g} of model time{history}.',
     'table': "The gaits' orbits are tables of at most {points} points, advanced by their phase: "
              'there is no network, and so nothing to disturb.'}
@@ -245,11 +245,11 @@ def readme(project: CProject, golden: Golden, command: str, arduino: bool = Fals
     data = project.data
     delay = max(plan.orbit.network.delay for plan in data.plans)
     history = f', and keeps {project.nodes} of them for the delay of {delay:g}' if delay else ''
-    form = FORMS[data.format.form].format(step=data.step, history=history, points=data.points)
+    form = FORM_TEXTS[data.format.form].format(step=data.step, history=history, points=data.points)
     f = 'f' if data.format.real == 'float32' else ''
     second = data.plans[1].name if len(data.plans) > 1 else ''
     switch = f'cpg_switch(&c, CPG_GAIT_{c_name(second)}, 1.0{f});' if second else ''
-    return TEXT.format(
+    return README.format(
         title=project.title, command=command, ram=project.ram, constants=data.bytes, form=form,
         test=('cc -std=c99 -Isrc src/*.c extras/test_cpg.c -lm -o test_cpg' if arduino else
               'cc -std=c99 cpg.c gait_data.c test_cpg.c -lm -o test_cpg'),

@@ -46,7 +46,7 @@ example: cpg export --robot quadruped --network delayed --gait trot walk --out g
 exit codes: 0 written, 1 a gait cannot run on the robot, 2 invalid arguments."""
 #: TOLERANCES: type of numbers -> error of a table, as a fraction of half the range of its values.
 TOLERANCES = {'float32': 1e-4, 'float64': 1e-9}
-MOST_STEPS = 2000
+MAX_STEPS = 2000
 
 
 def _parser() -> Parser:
@@ -130,8 +130,8 @@ def _refuse_step(step: float | None, plans: Sequence[GaitPlan]) -> None:
         return
     shortest = min(plan.orbit.network.delay or plan.orbit.period / 8.0 for plan in plans)
     longest = max(plan.orbit.network.delay for plan in plans)
-    if not longest / MOST_STEPS <= step <= shortest:
-        raise InputError(f'argument --step: {step:g} is not from {longest / MOST_STEPS:g} to '
+    if not longest / MAX_STEPS <= step <= shortest:
+        raise InputError(f'argument --step: {step:g} is not from {longest / MAX_STEPS:g} to '
                          f'{shortest:g}')
 
 

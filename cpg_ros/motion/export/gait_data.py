@@ -27,14 +27,14 @@ from cpg_ros.dynamics.orbit import Orbit
 from cpg_ros.motion.phase_readout import PhaseReadout
 from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.motion.readout import WaveReadout
-from cpg_ros.motion.robot import WEIGHTS
+from cpg_ros.motion.robot import WEIGHT_COUNTS
 from cpg_ros.networks.equations import values_of
 import numpy as np
 
-FLAT = 1e-3
-POINTS = (16, 32, 64, 128, 256, 512, 1024, 2048, 4096)
-#: LEAD: type of numbers -> entries of the tables over a waveform's angle.
-LEAD = {'float32': 256, 'float64': 512}
+MIN_RANGE = 1e-3
+TABLE_SIZES = (16, 32, 64, 128, 256, 512, 1024, 2048, 4096)
+#: WAVEFORM_SIZES: type of numbers -> entries of the tables over a waveform's angle.
+WAVEFORM_SIZES = {'float32': 256, 'float64': 512}
 LIMITS = ('lower', 'upper', 'velocity')
 
 
@@ -82,7 +82,7 @@ def comment(text: str) -> str:
 
 
 def hermite_table(curve: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], tolerance: float,
-                  points: Sequence[int] = POINTS) -> np.ndarray:
+                  points: Sequence[int] = TABLE_SIZES) -> np.ndarray:
     """Tabulate periodic curves with as few points as a tolerance allows.
 
     Args:
@@ -103,7 +103,7 @@ def hermite_table(curve: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], 
         off = np.abs(middle - curve(grid + 0.5 / count)[0]).max(axis=1)
         half = 0.5 * np.ptp(values, axis=1)
         # A curve that hardly moves beside the others need not be as exact.
-        if (off <= tolerance * np.maximum(half, FLAT * half.max())).all():
+        if (off <= tolerance * np.maximum(half, MIN_RANGE * half.max())).all():
             break
     return np.stack([values, slopes], axis=2)
 
@@ -176,7 +176,7 @@ class GaitData:
         used = np.flatnonzero(np.concatenate(weights).any(axis=0))
         highest = int(used.max()) + 1 if used.size else 1
         #: Readout weights of a joint that are exported, and whether phases are retimed.
-        self.weights = next(order for order in WEIGHTS if order >= highest)
+        self.weights = next(order for order in WEIGHT_COUNTS if order >= highest)
         self.retimed = any((self.maps(plan) is not None) for plan in plans)
 
     def maps(self, plan: GaitPlan) -> np.ndarray | None:
@@ -274,7 +274,7 @@ class GaitData:
     @property
     def angles(self) -> int:
         """Number of entries of tables over the angle of a waveform."""
-        return LEAD[self.format.real]
+        return WAVEFORM_SIZES[self.format.real]
 
     @property
     def step(self) -> float:

@@ -30,10 +30,10 @@ from xml.etree import ElementTree
 from cpg_ros.common.command_line import as_json, note, number, Parser, run, say
 from cpg_ros.common.errors import InputError
 from cpg_ros.common.files import write_atomically
-from cpg_ros.motion.body_file import LEGS
-from cpg_ros.motion.description import DescriptionError, load_urdf, RobotDescription, SERVOS
+from cpg_ros.motion.body_file import LEG_KINDS
+from cpg_ros.motion.description import DescriptionError, load_urdf, RobotDescription, SERVO_SPEEDS
 from cpg_ros.motion.robot import Robot
-from cpg_ros.motion.robot_file import LARGEST, load_robot, write_robot
+from cpg_ros.motion.robot_file import load_robot, MAX_NUMBER, write_robot
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.simulation.robot_model import find_model, SimulationError
 from cpg_ros.simulation.robot_setup.description_match import (
@@ -85,7 +85,7 @@ def _parser() -> Parser:
                         'x, a URDF that is turned to x is written beside the first')
     parser.add_argument('--velocity', type=number, metavar='RAD/S', help='velocity limit of all '
                         f"joints instead of the file's, which may be far from what motors do: "
-                        f'{SERVOS}')
+                        f'{SERVO_SPEEDS}')
     parser.add_argument('--gait', dest='gaits', nargs='+', default=[], metavar='GAIT',
                         help="gaits or presets to check (default: all gaits of the robot's "
                         'networks)')
@@ -104,8 +104,8 @@ def _checked(args: Namespace) -> RobotCheck:
                                    ('amplitude', args.amplitude, 3.0)):
         if value is not None and not (isfinite(value) and 0.0 <= value <= highest):
             raise InputError(f'--{option}: {value:g} is not from 0 to {highest:g}')
-    if args.velocity is not None and not 0.0 < args.velocity <= LARGEST:
-        raise InputError(f'--velocity: {args.velocity:g} is not above 0 and up to {LARGEST:g}')
+    if args.velocity is not None and not 0.0 < args.velocity <= MAX_NUMBER:
+        raise InputError(f'--velocity: {args.velocity:g} is not above 0 and up to {MAX_NUMBER:g}')
     if args.make is not None and args.make.suffix not in ('.yaml', '.yml'):
         raise InputError(f'--make: {args.make} does not end in .yaml')
     if args.make is not None and args.make.exists():
@@ -162,11 +162,11 @@ def _made(args: Namespace, description: RobotDescription) -> Robot:
         geometry = geometry_from(robot, description)
         others = [leg for leg in robot.legs if leg not in geometry.legs]
         feet = ('feedback can move all feet' if not others else
-                f'feedback moves no foot of {", ".join(others)}: a leg must be {LEGS}')
+                f'feedback moves no foot of {", ".join(others)}: a leg must be {LEG_KINDS}')
         if geometry.legs and geometry.mass > 0.0:
             robot = replace(robot, geometry=geometry)
         else:
-            feet = f'feedback: no leg is {LEGS}, or the {description.format} gives no mass'
+            feet = f'feedback: no leg is {LEG_KINDS}, or the {description.format} gives no mass'
     notes = f'{notes}\n{feet}'
     if args.velocity is not None:
         notes += f'\nvelocity limits: {args.velocity:g} rad/s, as given with --velocity'

@@ -31,9 +31,9 @@ from cpg_ros.motion.body_file import BodyGeometry, LegGeometry
 from cpg_ros.motion.description import (
     JointDescription,
     LegChain,
+    MIN_SPEED,
     RobotDescription,
-    SERVOS,
-    SLOW,
+    SERVO_SPEEDS,
 )
 from cpg_ros.motion.plan import beyond_limits, GaitPlan, plan_gait, PlanError
 from cpg_ros.motion.robot import Joint, Motion, Robot
@@ -439,10 +439,10 @@ def _notes(robot: Robot, description: RobotDescription) -> Iterator[str]:
     if idle:
         yield f'moving joints of the {what} that no leg drives: ' + ', '.join(idle)
     yield from invented_limits(robot, what)
-    slow = sorted({joint.velocity for joint in robot.joints if joint.velocity < SLOW})
+    slow = sorted({joint.velocity for joint in robot.joints if joint.velocity < MIN_SPEED})
     if slow:
         yield (f'velocity limits of {" and ".join(f"{speed:g}" for speed in slow)} rad/s are slow '
-               f'for a walking robot ({SERVOS}), and gaits keep to them: if your motors are '
+               f'for a walking robot ({SERVO_SPEEDS}), and gaits keep to them: if your motors are '
                f'faster, correct the {what}, or make the file with --velocity and what they reach')
 
 

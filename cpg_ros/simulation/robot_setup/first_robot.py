@@ -31,7 +31,7 @@ from cpg_ros.motion.description import (
     sprawls,
 )
 from cpg_ros.motion.plan import plan_gait
-from cpg_ros.motion.robot import HARMONICS, Joint, Robot
+from cpg_ros.motion.robot import Joint, NUM_HARMONICS, Robot
 from cpg_ros.motion.robot_file import LIMITS
 from cpg_ros.networks.registry import NETWORKS, numbered
 from cpg_ros.simulation.robot_setup.description_match import sole_up, unlimited
@@ -102,7 +102,7 @@ def robot_from(known: RobotDescription, name: str, legs: Legs) -> tuple[Robot, s
         notes.append(f'{leg}: ' + ', '.join(
             f'{joint} {role}' for joint, role in zip(made.chain.joints, roles, strict=True)))
     driven = {joint for leg in legs for joint in legs[leg]}
-    robot = Robot(name, networks, assignment, HARMONICS, joints,
+    robot = Robot(name, networks, assignment, NUM_HARMONICS, joints,
                   tuple(joint for joint in known.joints if joint in driven))
     return _fitting(robot), '\n'.join([*notes, *([legs.explanation] if legs.explanation else [])])
 

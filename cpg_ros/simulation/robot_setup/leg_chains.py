@@ -25,9 +25,9 @@ from cpg_ros.motion.description import (
     DescriptionError,
     JointDescription,
     LegChain,
+    REVOLUTE_TYPES,
     RobotDescription,
     sprawls,
-    TURNING,
 )
 from cpg_ros.networks.leg_numbers import leg_names
 import numpy as np
@@ -111,7 +111,7 @@ def _crosswise(description: RobotDescription, legs: Iterable[Sequence[str]]) -> 
     across = np.zeros(3)
     for leg in legs:
         axes = np.array([description.direction(name) for name in leg
-                         if description.joints[name].kind in TURNING])
+                         if description.joints[name].kind in REVOLUTE_TYPES])
         first = next((k for k in range(len(axes) - 1) if abs(axes[k] @ axes[k + 1]) > 0.99), None)
         if first is None:
             across += np.abs(axes).sum(axis=0)
@@ -190,7 +190,7 @@ def _pairs(limbs: Sequence[LegChain], left: np.ndarray) -> list[tuple[LegChain, 
 def _question(description: RobotDescription, paths: Sequence[Sequence[str]]) -> str:
     """Return a question about which limbs are legs, with the option that answers it."""
     axes = np.array([description.direction(name) for path in paths for name in path
-                     if description.joints[name].kind in TURNING]).reshape(-1, 3)
+                     if description.joints[name].kind in REVOLUTE_TYPES]).reshape(-1, 3)
     spread, ways = np.linalg.eigh(axes.T @ axes / max(len(axes), 1))
     if len(paths) > 3 and max(spread[0], abs(ways[2, 0])) < PLANE_TOLERANCE < spread[1]:
         # Legs roll and pitch about level axes, and what is across both is up.
@@ -281,7 +281,7 @@ def _cleaned(description: RobotDescription, legs: Mapping[str, Sequence[str]]) -
                 raise LegsError(f'leg {leg}: none of its joints can be driven')
     driven = {name for joints in keep.values() for name in joints}
     rest = tuple(name for name, joint in description.joints.items()
-                 if joint.kind in TURNING and name not in driven)
+                 if joint.kind in REVOLUTE_TYPES and name not in driven)
     return Legs(keep, '\n'.join(notes), rest)
 
 

@@ -26,7 +26,7 @@ import math
 from cpg_ros.dynamics.orbit import Orbit
 from cpg_ros.feedback.efference_copy import periodic
 from cpg_ros.feedback.kinematics import foot_of, geometry_of, joints_of
-from cpg_ros.motion.body_file import BodyGeometry, leg_axes, LEGS
+from cpg_ros.motion.body_file import BodyGeometry, leg_axes, LEG_KINDS
 from cpg_ros.motion.phase_readout import joint_readout, standing
 from cpg_ros.motion.readout import Duty
 from cpg_ros.motion.robot import Joint, JointMotion, Robot
@@ -122,7 +122,7 @@ class Leg:
 
         """
         if leg not in body.legs:
-            raise SimulationError(f'leg {leg} cannot be tuned: it is not {LEGS}')
+            raise SimulationError(f'leg {leg} cannot be tuned: it is not {LEG_KINDS}')
         own = body.legs[leg]
         names = own.joints if own.yaw is not None else own.joints[-2:]
         by_name = {joint.name: joint for joint in robot.legs[leg]}

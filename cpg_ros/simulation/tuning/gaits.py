@@ -29,7 +29,7 @@ from typing import Any
 
 from cpg_ros.common.command_line import progress_bar
 from cpg_ros.common.errors import InputError
-from cpg_ros.motion.description import SERVOS
+from cpg_ros.motion.description import SERVO_SPEEDS
 from cpg_ros.motion.plan import gait_of, GaitPlan, OutOfLimits, plan_gait, PlanError
 from cpg_ros.motion.robot import Motion, Robot, SteeringTable
 from cpg_ros.networks.registry import NETWORKS
@@ -141,7 +141,7 @@ class ClosestDesign:
         return (f'{100.0 * self.error.excess:.0f} %: it would keep to it at '
                 f'{self.fraction * self.frequency:.2f} Hz, too slow to be tried, or at '
                 f'{100.0 * self.fraction:.0f} % of its amplitude; if the motor is faster '
-                f'({SERVOS}), make the robot file anew with --velocity and what it reaches')
+                f'({SERVO_SPEEDS}), make the robot file anew with --velocity and what it reaches')
 
 
 #: SEARCH_DURATION: duration of the runs that compare designs, s; REPORT_DURATION: duration of the

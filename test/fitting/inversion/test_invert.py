@@ -25,7 +25,7 @@ from cpg_ros.fitting.inversion.free_parameters import free_numbers
 from cpg_ros.fitting.inversion.invert import invert
 from cpg_ros.fitting.inversion.leg_duty import GaitReadout
 from cpg_ros.motion.plan import validate_orbit
-from cpg_ros.motion.robot import HARMONICS
+from cpg_ros.motion.robot import NUM_HARMONICS
 from cpg_ros.networks.library.delayed import Delayed
 from cpg_ros.networks.library.quadruped import Quadruped
 from cpg_ros.networks.registry import PRESETS
@@ -282,10 +282,10 @@ def test_what_the_generator_runs_is_preferred(monkeypatch):
 
 
 def test_what_the_generator_refuses():
-    assert validate_orbit(solve_orbit(TROT, 'trot'), 'trot', HARMONICS) == ''
-    assert validate_orbit(solve_preset(PRESETS['biped']['walk']), 'walk', HARMONICS) == ''
+    assert validate_orbit(solve_orbit(TROT, 'trot'), 'trot', NUM_HARMONICS) == ''
+    assert validate_orbit(solve_preset(PRESETS['biped']['walk']), 'walk', NUM_HARMONICS) == ''
     fast = Delayed(-450.0, 100.0, 650.0, -200.0, 0.004)
-    assert 'its period' in validate_orbit(solve_orbit(fast, 'trot'), 'trot', HARMONICS)
+    assert 'its period' in validate_orbit(solve_orbit(fast, 'trot'), 'trot', NUM_HARMONICS)
 
 
 def test_verdicts_come_with_a_fit():
