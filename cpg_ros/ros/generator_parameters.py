@@ -75,10 +75,10 @@ def specs(network: type[Network]) -> dict[str, Spec]:
                                'which the generator moves it to the stand if it commands the '
                                'robot (command) or autostart is false; empty for none',
                                read_only=True),
-        'assume_stand': Spec(False, 'begin at the stand where no pose is measured, although '
-                             'command is not none: for robots that do not measure positions, '
-                             'whose joints jump there, and behind a bridge or a simulation that '
-                             'moves the robot to the stand itself', read_only=True),
+        'assume_stand': Spec(False, 'start at the stand if no pose is measured, even if '
+                             'command is not none: for robots without joint encoders, whose '
+                             'joints jump to the stand, and for bridges and simulations, which '
+                             'move the robot to the stand themselves', read_only=True),
         'tracking_error': Spec(0.3, 'mean distance of a measured joint from its commanded angle '
                                'at which /diagnostics reports an error and feedback fades out '
                                '[rad]',

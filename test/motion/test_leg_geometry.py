@@ -68,7 +68,7 @@ def test_a_leg_that_feedback_cannot_move_is_named_and_stays(tmp_path, capsys):
         text = text[:begin] + f'<axis xyz="{axis}"' + text[end:]
     (tmp_path / 'other.urdf').write_text(text)
     robot = made(tmp_path, tmp_path / 'other.urdf')
-    assert 'feedback moves no foot of lh' in capsys.readouterr().err
+    assert 'feedback cannot move the feet of lh' in capsys.readouterr().err
     assert set(robot.geometry.legs) == {'rh', 'lf', 'rf'}
     geometry, stand = geometry_of(robot), robot.column('offset')
     way = np.tile([0.03, -0.02, 0.04], (4, 1))

@@ -203,7 +203,7 @@ def limping(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]) -> l
     for leg, own in size.items():
         usual = float(np.median([other for name, other in size.items() if name != leg]))
         if own < LIMP_RATIO * usual:
-            limping_legs.append(f'{leg} moves by {own / usual:.2f} of what the other legs do')
+            limping_legs.append(f'{leg} moves {own / usual:.2f} times as far as the other legs')
     return limping_legs
 
 

@@ -427,8 +427,8 @@ def _regions(times: np.ndarray, x: np.ndarray, source: str) -> tuple[RoughPhase,
         stretches = [stretch for stretch in stretches if stretch.outside(seed.begin, seed.end)
                  and stretch.cycles >= MIN_OTHER_CYCLES and stretch.size >= 0.5 * largest]
     if not regions:
-        raise NoSteadyGait(f'{source}: no steady gait: the joints come back to where they were '
-                           f'only roughly, and for {seed.cycles:.1f} cycles of '
+        raise NoSteadyGait(f'{source}: no steady gait: the joints repeat their motion '
+                           f'only roughly, for {seed.cycles:.1f} cycles of '
                            f'{seed.period:.3g} s: record {RELIABLE_CYCLES:g} strides or more')
     regions.sort(key=lambda stretch: stretch[0].begin - stretch[0].end)
     rough = regions[0][0]

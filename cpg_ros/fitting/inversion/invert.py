@@ -82,26 +82,26 @@ def findings(free: Sequence[Free], estimates: Mapping[str, Estimate], spread: Sp
     if model.size > 0.0:
         bounded = [name for name, estimate in estimates.items() if estimate.bounded]
         unknown = [name for name in estimates if name not in bounded]
-        clauses = [f'the intervals of {_listed(bounded)} include that'] if bounded else []
+        clauses = [f'the intervals of {_listed(bounded)} allow for this'] if bounded else []
         if unknown:
             clauses.append(f'{_listed(unknown)}: cannot tell')
         lines.append((
-            f'the model is not what was recorded: it leaves {times:.3g} times the noise, as '
-            f'waveforms that are off by {100.0 * model.size:.2g} % would; '
-            if np.isfinite(model.size) else 'feet bore loads: how far joints gave way to them '
-            "counts as the network's motion, and is not known; ") + '; '.join(clauses))
+            f'the model does not fit the recording: the residual is {times:.3g} times the noise, '
+            f'as with waveforms that are wrong by {100.0 * model.size:.2g} %; '
+            if np.isfinite(model.size) else 'feet bore loads, under which the joints deviated '
+            'from their commands by an unknown amount; ') + '; '.join(clauses))
     for row in spread.blind:
         blind = [estimate.name for estimate,
                  fraction in zip(free, row, strict=False) if abs(fraction) > NULL_THRESHOLD]
         if len(blind) == 1:
-            lines.append(f'{blind[0]} is not determined: it changes nothing that was recorded')
+            lines.append(f'{blind[0]} is not determined: it does not affect the recorded motion')
         elif blind:
             moves = row[:len(free)] * spread.scale[:len(free)]
             moves = moves / np.abs(moves).max()
             ways = ', '.join(f'{estimate.name} by {move:+.3g}' for estimate, move
                              in zip(free, moves, strict=True) if estimate.name in blind)
-            lines.append(f'{_listed(blind)} are not determined one by one: moving {ways} '
-                         'changes nothing that was recorded')
+            lines.append(f'{_listed(blind)} are not determined one by one: changing {ways} '
+                         'does not affect the recorded motion')
     for k, (name, estimate) in enumerate(estimates.items()):
         room = BOUND_TOLERANCE * (free[k].high - free[k].low)
         for end, bound in (('lower', free[k].low), ('upper', free[k].high)):
@@ -446,9 +446,9 @@ def _if_joints_lag(problem: CycleProblem, values: np.ndarray, estimated: Mapping
                         break
                     beyond = True
         if ends != [one.low, one.high]:
-            lines.append(f'{name} may be from {ends[0]:.4g} to {ends[1]:.4g} if joints of a leg '
-                         'lag one another: the interval is that of joints which move with their '
-                         "cells, as the generator's do")
+            lines.append(f'{name} may be from {ends[0]:.4g} to {ends[1]:.4g} if the joints of a '
+                         'leg lag each other; its interval assumes that joints move with their '
+                         'cells, as those of the generator do')
     return lines
 
 

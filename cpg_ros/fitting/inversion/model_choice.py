@@ -166,9 +166,9 @@ def indistinguishable(comparisons: Sequence[NetworkComparison], order: int) -> s
     alike = [comparison.network for comparison in comparisons if comparison.alike]
     if len(alike) < 2:
         return ''
-    text = (f'the recording does not tell {", ".join(alike[:-1])} and {alike[-1]} apart; the one '
-            'with the fewest numbers is fitted')
-    return text if order == 1 else f'{text}; readouts of a lower order (--order 1) tell more apart'
+    text = (f'the recording does not distinguish {", ".join(alike[:-1])} and {alike[-1]}; the one '
+            'with the fewest parameters is fitted')
+    return text if order == 1 else f'{text}; a readout of order 1 (--order 1) may tell more'
 
 
 def as_rows(comparisons: Sequence[NetworkComparison]) -> list[tuple[str, ...]]:

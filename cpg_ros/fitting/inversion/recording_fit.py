@@ -145,8 +145,8 @@ def _with_duty_if_told(names: tuple[str, ...], order: int,
         return fitted((*names, GAIT_DUTY), order, minima), ()
     known = other.parameters[GAIT_DUTY].stderr < MAX_DUTY_STDERR or np.isinf(other.model_error)
     return own, () if known else (
-        'the recording does not tell how long legs stand: they are taken to stand as the cells of '
-        'the network do, and the intervals hold for that alone',)
+        'the recording does not determine how long the legs stand: the fit and its intervals '
+        "assume the duty factor of the network's cells",)
 
 
 def _as_it_is(cycle: Stride, cells: Mapping[str, int], network: Network, gait: str, order: int,
@@ -331,8 +331,8 @@ def _steady(recording: Recording, legs: Mapping[str, Sequence[str]], kind: type[
             raise
     cells, stride = stride_of(recognised, legs, kind, robot, gait)
     return recognised, cells, replace(stride, confidence=0.5 * stride.confidence), [
-        f'taken for exactly one stride, of {recognised.cycle:.4g} s, as it ends where it begins: '
-        'say so (--cycle), or record several strides']
+        f'taken for exactly one stride of {recognised.cycle:.4g} s, as it ends where it begins: '
+        'confirm this (--cycle), or record several strides']
 
 
 def _none_of(kind: type[Network], stride: Stride) -> str:
@@ -340,9 +340,9 @@ def _none_of(kind: type[Network], stride: Stride) -> str:
     phases = ', '.join(f'{leg} {phase:.3f}' + (
         f' +- {stride.scatter[leg].spread:.3f}' if stride.scatter[leg].spread > 0.0 else '')
         for leg, phase in stride.phases.items())
-    return (f'the recorded phases are none of the gaits of the network {kind.name}: the nearest '
+    return (f'the recorded phases match no gait of the network {kind.name}: the nearest '
             f'is {stride.nearest}, {stride.distance:.3f} of a cycle off; phases at '
-            f'{stride.frequency:.4g} Hz, and how far single strides are off them: {phases}')
+            f'{stride.frequency:.4g} Hz, and their deviations in single strides: {phases}')
 
 
 def _phases_as_estimates(fit: Fit, stride: Stride) -> dict[str, Estimate]:

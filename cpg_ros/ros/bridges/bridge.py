@@ -416,7 +416,7 @@ class BridgeNode(StartedNode):
             if not of_one_name or time.monotonic() > end:
                 raise StartRefused(text)
             if not logged:
-                self.log_step(f'waiting until a node that was killed is forgotten: {text}')
+                self.log_step(f'waiting until the middleware drops a node that was killed: {text}')
             logged = True
             wait(0.1)
         self.log_step('no other command publisher')
@@ -469,14 +469,14 @@ class BridgeNode(StartedNode):
         state = self.supervisor.state
         if state is BridgeState.HANGING and not self._ending:
             self._requests.append(self.supervisor.stand)
-            response.success, response.message = True, 'it follows targets from now on'
+            response.success, response.message = True, 'following targets'
             return response
         if state in ACTIVE_STATES or self._start is not None or self._ending:
             response.message = ('it is being started already' if self._start is not None else
                                 f'it is {state.value}')
             return response
         self._begin_start()
-        response.success, response.message = True, 'starting: ~/state and the log say how it goes'
+        response.success, response.message = True, 'starting: ~/state and the log show progress'
         return response
 
     def _check_graph(self) -> None:

@@ -112,7 +112,7 @@ class Targets:
             leap = np.abs(target - self._to) - self._velocity * min(gap, MAX_GAP) - MAX_JUMP
             worst = int(leap.argmax())
             if not leap[worst] <= 0.0:
-                self.rejection = (f'the target of {self._names[worst]} leapt by '
+                self.rejection = (f'the target of {self._names[worst]} jumped by '
                                   f'{abs(target[worst] - self._to[worst]):.2f} rad')
                 return
             self._from = self.at(now)
@@ -280,7 +280,7 @@ class Supervisor:
             return reason
         self._at, self._gathered = self.robot.q.astype(float), 0.0
         self.targets.reset()
-        self._enter(BridgeState.RISING, now, 'from the pose that it was found in')
+        self._enter(BridgeState.RISING, now, 'from its present pose')
         return ''
 
     def stand(self, now: float) -> None:
@@ -361,7 +361,7 @@ class Supervisor:
     def _fault(self, now: float) -> str:
         timeout = self._settings.state_timeout
         if now - self._before > timeout:
-            return f'the bridge itself stood still for {1e3 * (now - self._before):.0f} ms'
+            return f'the bridge itself stalled for {1e3 * (now - self._before):.0f} ms'
         if now - self._received > timeout:
             return f'no fresh state of the robot for {1e3 * timeout:.0f} ms'
         return self._checks.fault()
@@ -417,7 +417,7 @@ class Supervisor:
                 self.damp(now, f'{settings.names[worst]} is {away[worst]:.2f} rad from the stand '
                           'after rising')
             elif settings.rack:
-                self._enter(BridgeState.HANGING, now, 'it has risen; ~/start lets it go on')
+                self._enter(BridgeState.HANGING, now, 'it has risen; call ~/start to continue')
             else:
                 # An earlier target does not show that a generator is running.
                 self.targets.reset()

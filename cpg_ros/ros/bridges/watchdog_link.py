@@ -100,7 +100,7 @@ def _holder(name: str) -> str:
         try:
             line.connect(name)
         except OSError:
-            return 'a program that takes no connections'
+            return 'a program that accepts no connections'
         return peer(line)
 
 
@@ -304,8 +304,8 @@ class WatchdogLink:
         if not of_this_user(line):
             who = peer(line)
             line.close()
-            raise ForeignWatchdog(f'what answers as the watchdog of this robot is {who}, another '
-                                  'user than the bridge: end it')
+            raise ForeignWatchdog(f'the watchdog of this robot is {who}, who is not the user '
+                                  'of the bridge: end it')
         # One that an earlier bridge started has that bridge's timeout.
         with contextlib.suppress(OSError):
             line.send(TickMonitor.hello(self._timeout))

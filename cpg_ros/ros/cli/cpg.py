@@ -140,7 +140,7 @@ def _common(node: str, wait: float | str) -> Parser:
     options.add_argument('--node', default=node, metavar='NAME',
                       help=f'node to talk to (default: {DEFAULT_NODE})')
     options.add_argument('--wait', type=number, default=wait, metavar='S',
-                      help='how long a node, or the publisher of a topic, is waited for, s '
+                      help='longest wait for a node, or for the publisher of a topic, s '
                       f'(default: {DISCOVERY_TIMEOUT:g})')
     return options
 
@@ -204,8 +204,8 @@ def parser() -> Parser:
     play.add_argument('topics', nargs='*', metavar='TOPIC', help='topics to play (default: all)')
     play.add_argument('--rate', type=rate, default=1.0, metavar='R',
                       help='playback speed relative to the recording (default: %(default)g)')
-    schedule = add(actions, 'play-schedule', 'set the generator at the times of a schedule, which '
-                   'inversion --schedule writes')
+    schedule = add(actions, 'play-schedule', 'set the parameters of the generator at the times '
+                   'of a schedule, as inversion --schedule writes it')
     schedule.add_argument('schedule', type=Path, metavar='FILE', help='YAML file')
     schedule.add_argument('--rate', type=rate, default=1.0, metavar='R',
                           help='speed relative to the schedule (default: %(default)g)')

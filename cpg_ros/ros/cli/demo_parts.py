@@ -352,12 +352,12 @@ def prepare(args: Namespace, steps: Steps) -> DemoRobot:
 def _again(file: Path, source: Path, option: str, args: Namespace) -> None:
     """Report that a file is reused; refuse an option that would have changed it."""
     if getattr(args, option) is not None:
-        raise InputError(f'argument --{option}: {file} is there already; delete it, or give '
+        raise InputError(f'argument --{option}: {file} exists already; delete it, or give '
                          'another folder with --out')
     mtime = file.stat().st_mtime
     later = f', though {source} has changed since' if source.stat().st_mtime > mtime else ''
-    say(f'{file} of {datetime.fromtimestamp(mtime):%Y-%m-%d %H:%M} is used again{later}; delete '
-        'it to make it anew')
+    say(f'using {file} of {datetime.fromtimestamp(mtime):%Y-%m-%d %H:%M} again{later}; delete it '
+        'to regenerate it')
 
 
 def _tune(args: Namespace, steps: Steps, files: tuple[Path, Path], gaits: Sequence[str]) -> None:
@@ -378,8 +378,8 @@ def _tune(args: Namespace, steps: Steps, files: tuple[Path, Path], gaits: Sequen
     if not tuned.exists():
         raise StepFailed(codes[-1])
     if 0 not in codes:
-        say(f'no gait is good: delete {tuned}, and --evaluations {2 * evaluations} searches for '
-            'longer, --kp and --kd give stiffer joints')
+        say(f'no gait is good: delete {tuned}, and search longer with --evaluations '
+            f'{2 * evaluations}, or give stiffer joints with --kp and --kd')
 
 
 def _ranked(motions: dict[str, Motion]) -> tuple[tuple[str, ...], bool]:

@@ -223,8 +223,8 @@ class FeedbackLoop(SensorLoop):
         inputs, plan = self.inputs, self._pattern.plan
         reasons, _ = inputs.faults(self._instant.numbers[TIME])
         if mounted := MOUNT_TEXTS[int(self._state[MOUNT])]:
-            reasons.append(f'{inputs.monitors[0].name}: its angular velocity is not that of the '
-                         f'legs on the ground: it seems to be mounted {mounted} '
+            reasons.append(f'{inputs.monitors[0].name}: its angular velocity contradicts that of '
+                         f'the legs on the ground: it seems to be mounted {mounted} '
                          '(feedback.imu_mount)')
         if plan.motion.efference is None:
             reasons.append(f"the robot file has no efference copy of the gait '{plan.name}'")

@@ -81,9 +81,9 @@ TOPICS = fixed({
     f'{PREFIX}odometry_scale': Spec(1.0, 'true distance divided by odometry distance, for this '
                                     'robot and ground', 0.5, 2.0),
     f'{PREFIX}odometry_scale_error': Spec(SCALE_ERROR, 'standard deviation of that scale, for the '
-                                          'covariance: about 0.015 where it was measured', 0.0,
+                                          'covariance; measured values were about 0.015', 0.0,
                                           0.5),
-    f'{PREFIX}odom_frame': Spec('odom', 'frame of that odometry, which begins where the base is'),
+    f'{PREFIX}odom_frame': Spec('odom', 'frame of that odometry, which begins at the base'),
     f'{PREFIX}base_frame': Spec('base_link', "frame of the robot's base"),
     f'{PREFIX}odometry_tf': Spec(True, 'publish the transform between these frames on /tf, too, '
                                  'where tf2_msgs is installed')})

@@ -162,7 +162,7 @@ def _made(args: Namespace, description: RobotDescription) -> Robot:
         geometry = geometry_from(robot, description)
         others = [leg for leg in robot.legs if leg not in geometry.legs]
         feet = ('feedback can move all feet' if not others else
-                f'feedback moves no foot of {", ".join(others)}: a leg must be {LEG_KINDS}')
+                f'feedback cannot move the feet of {", ".join(others)}: a leg must be {LEG_KINDS}')
         if geometry.legs and geometry.mass > 0.0:
             robot = replace(robot, geometry=geometry)
         else:

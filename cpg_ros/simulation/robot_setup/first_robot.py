@@ -153,11 +153,11 @@ class _StandingLeg:
                  and (k or abs(axes[k, 2]) < 0.7)]
         biped, count = len(legs) == 2, len(axes)
         if not pairs or (chain.lengths[-1] < 1e-3 and not biped):
-            why = ('no two joints in a row turn about parallel axes: legs whose knee has no such '
-                   'neighbour are not supported'
-                   if not pairs else f'nothing is known of what is below {chain.joints[-1]}, not '
-                   'where its foot is: give it a <collision> shape, or install the package of '
-                   'its meshes')
+            why = ('no two joints in a row have parallel axes, as hip pitch and knee must: such '
+                   'a leg is not supported'
+                   if not pairs else f'the position of the foot below {chain.joints[-1]} is '
+                   'unknown: give its link a <collision> shape, or install the package of its '
+                   'meshes')
             raise DescriptionError(f'leg {leg} ({", ".join(chain.joints)}): {why}')
         bend, aside, end = pairs[0], None, count
         # Or the leg swings about y, and is bent to the side.

@@ -87,10 +87,10 @@ def legs_in(description: RobotDescription, faces_x: bool = False,
     if fitting[0]:
         ways = ' or '.join(DIRECTIONS[quarter] for quarter in fitting)
         raise LegsError(
-            f'the robot faces {ways} of the {description.format}, by '
-            f"{'the axes of its legs' if crosswise else 'the names of its legs'}, and x is to be "
-            f'forward (REP 103): --forward={DIRECTIONS[fitting[0]]} makes a URDF that is turned, '
-            '--forward x takes x for forward')
+            f'the robot faces {ways} in the {description.format}, by '
+            f"{'the axes of its legs' if crosswise else 'the names of its legs'}, but x must be "
+            f'forward (REP 103): --forward={DIRECTIONS[fitting[0]]} writes a turned URDF, '
+            '--forward x keeps x as forward')
     return _cleaned(description, by_quarter[fitting[0]])
 
 
@@ -194,8 +194,8 @@ def _question(description: RobotDescription, paths: Sequence[Sequence[str]]) -> 
     spread, ways = np.linalg.eigh(axes.T @ axes / max(len(axes), 1))
     if len(paths) > 3 and max(spread[0], abs(ways[2, 0])) < PLANE_TOLERANCE < spread[1]:
         # Legs roll and pitch about level axes, and what is across both is up.
-        return ('no legs are found: the axes of the joints say that '
-                f'{"xyz"[int(np.abs(ways[:, 0]).argmax())]} is up, and z is to be (REP 103): turn '
+        return ('no legs are found: by the axes of the joints, '
+                f'{"xyz"[int(np.abs(ways[:, 0]).argmax())]} is up, but z must be (REP 103): turn '
                 'the description')
     limbs = _limbs(description, paths, np.array([0.0, 1.0, 0.0]))
     why = ('no legs are found: no two limbs of two to six joints that reach down are mirror '
@@ -208,7 +208,7 @@ def _question(description: RobotDescription, paths: Sequence[Sequence[str]]) -> 
     left, right = ([limb for limb in limbs if sign * limb.anchors[0, 1] > 0.0]
                    for sign in (1.0, -1.0))
     if not 1 <= len(left) == len(right) <= 3:
-        return f'{why}; --legs LEG=TEXT ... states a part of the names of the joints of each leg'
+        return f'{why}; --legs LEG=TEXT ... names each leg by a part of the names of its joints'
     limbs = [limb for pair in zip(left, right, strict=True) for limb in pair]
     options = [f'{leg}={_in_all(limb.joints)}'
                for leg, limb in zip(leg_names(len(limbs)), limbs, strict=True)]
@@ -237,11 +237,11 @@ def _misnamed(legs: Mapping[str, Sequence[str]]) -> list[str]:
 def _contradiction(description: RobotDescription, legs: Mapping[str, Sequence[str]]) -> str:
     leg = _misnamed(legs)[0]
     x, y, _ = description.frame(legs[leg][0])[0]
-    return (f"'{legs[leg][0]}' is at x {x:.3g} m, y {y:.3g} m, where {leg} is if x is forward and "
-            'y to the left, and no way of turning the robot fits all names: correct the '
-            'description; say --forward x if positions are right and names are not, or --legs '
-            + ' '.join(f'{leg}={_in_all(joints)}'
-                       for leg, joints in legs.items()) + ', changed as it is right')
+    return (f"'{legs[leg][0]}' is at x {x:.3g} m, y {y:.3g} m, where the leg {leg} is, but has "
+            'the name of another; no way of turning the robot makes all names fit: correct the '
+            'description; or give --forward x if the positions are right and the names are not; '
+            'or correct and give --legs '
+            + ' '.join(f'{leg}={_in_all(joints)}' for leg, joints in legs.items()))
 
 
 def _named(description: RobotDescription, given: Mapping[str, str]) -> dict[str, tuple[str, ...]]:

@@ -109,7 +109,7 @@ def test_the_error_of_another_readout_is_in_the_intervals(name, gait):
                             error=noise)
         fit = invert(recording, cells, preset.network, gait)
         assert fit.model_error > 0.0
-        assert 'the model is not what was recorded' in ' '.join(fit.warnings)
+        assert 'the model does not fit the recording' in ' '.join(fit.warnings)
         for one, found in fit.parameters.items():
             assert found.low <= truth_of(preset.network, one) <= found.high
 

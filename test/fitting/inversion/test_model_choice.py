@@ -46,7 +46,7 @@ def test_phases_of_no_gait_are_fitted_as_they_are(tmp_path, gait):
     truth = recorded(tmp_path / 'own.csv', gait)
     found = fit_recording(read_csv(tmp_path / 'own.csv'))
     assert found.fit.network.name == 'phase' and found.fit.gait == gait
-    said = next(line for line in found.warnings if 'none of the gaits of the network delayed' in
+    said = next(line for line in found.warnings if 'match no gait of the network delayed' in
                 line)
     assert 'fitted as they are, by the network phase' in said
     assert f'rf {found.stride.phases["rf"]:.3f} +- ' in said
@@ -57,9 +57,9 @@ def test_phases_of_no_gait_are_fitted_as_they_are(tmp_path, gait):
         assert abs(error) <= 2.0 * (one.high - one.value) < 0.01
         assert 0.0 < one.stderr < found.stride.scatter[leg].spread
     # What was asked for by name is not exchanged.
-    with pytest.raises(InputError, match='none of the gaits of the network delayed') as caught:
+    with pytest.raises(InputError, match='match no gait of the network delayed') as caught:
         fit_recording(read_csv(tmp_path / 'own.csv'), network='delayed')
-    assert 'how far single strides are off them: lh 0.000, rh ' in str(caught.value)
+    assert 'their deviations in single strides: lh 0.000, rh ' in str(caught.value)
 
 
 def test_the_network_that_explains_a_canter(tmp_path, capsys):
@@ -111,7 +111,7 @@ def test_the_network_that_made_a_trot_explains_it(tmp_path, monkeypatch):
     # Readouts of order 3 make such a waveform of several: the fewest numbers come first.
     assert shaped[0].network == 'hopf' and shaped[1].alike and shaped[0].numbers == 1 + 8 * 7
     text = indistinguishable(shaped, 3)
-    assert 'does not tell hopf' in text and '--order 1' in text
+    assert 'does not distinguish hopf' in text and '--order 1' in text
     assert sorted(row[-1] for row in as_rows(plain)) == ['', 'told from the least', 'yes', 'yes']
 
 

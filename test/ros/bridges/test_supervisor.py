@@ -154,7 +154,7 @@ def test_a_leap_of_a_target_is_not_followed():
     rig.run(0.026)
     assert np.allclose(rig.machine.command.q, held)
     rig.run(0.084)
-    assert rig.machine.state is BridgeState.SITTING and 'leapt by 0.' in rig.machine.reason
+    assert rig.machine.state is BridgeState.SITTING and 'jumped by 0.' in rig.machine.reason
     again = Rig().following()
     again.target = GO2.stand - 0.8
     again.run(0.05)
@@ -244,7 +244,7 @@ def test_a_bridge_that_stood_still_damps():
     rig = Rig().following()
     rig.now += 0.03
     rig.run(DT)
-    assert rig.machine.state is BridgeState.DAMPING and 'itself stood still' in rig.machine.reason
+    assert rig.machine.state is BridgeState.DAMPING and 'itself stalled' in rig.machine.reason
 
 
 def test_it_does_not_rise_in_danger_and_rises_after_it():

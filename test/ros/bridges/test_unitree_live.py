@@ -227,8 +227,9 @@ def test_another_users_watchdog_is_not_trusted():
         robot.start()
         process = alone('motion_switcher:=false', *PATIENT, domain=domain)
         try:
-            process.wait_for('not started: what answers as the watchdog of this robot is process '
-                             f'{stranger.pid} of user nobody, another user than the bridge')
+            process.wait_for('not started: the watchdog of this robot is process '
+                             f'{stranger.pid} of user nobody, who is not the user of the '
+                             'bridge')
             assert 'rising' not in process.log
         finally:
             process.end()

@@ -80,9 +80,9 @@ def test_a_robot_file_is_made_then_its_gaits_are_tuned_and_both_are_used_again(t
     assert said[1].startswith('gaits, best first: trot (')
     steps = Made()
     assert demo_parts.prepare(args(tmp_path), steps) == robot and not steps.words
-    assert capsys.readouterr().out.count('is used again') == 2
+    assert capsys.readouterr().out.count('; delete it to regenerate it') == 2
     for option in ('velocity', 'evaluations'):
-        with pytest.raises(InputError, match=rf'--{option}: .*\.yaml is there already'):
+        with pytest.raises(InputError, match=rf'--{option}: .*\.yaml exists already'):
             demo_parts.prepare(args(tmp_path, **{option: 5}), steps)
 
 
@@ -151,8 +151,9 @@ def test_a_gait_that_cannot_be_had_does_not_stop_the_other(tmp_path, capsys):
 def test_where_no_gait_is_good_it_says_what_to_try(tmp_path, capsys):
     assert demo_parts.prepare(args(tmp_path), Made(0, 1, 1, writing=(0, 1))).gaits
     assert (
-        f"no gait is good: delete {tmp_path / 'quadruped_tuned.yaml'}, and --evaluations 240 "
-        'searches for longer, --kp and --kd give stiffer joints\n') in capsys.readouterr().out
+        f"no gait is good: delete {tmp_path / 'quadruped_tuned.yaml'}, and search longer with "
+        '--evaluations 240, or give stiffer joints with --kp and --kd\n'
+    ) in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(('arguments', 'words'), [

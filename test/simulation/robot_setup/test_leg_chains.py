@@ -154,7 +154,7 @@ def test_a_robot_whose_y_is_up_is_refused_with_the_axis():
         moved, about = (' '.join(text.split()[k] for k in (1, 2, 0)) for text in (xyz, axis))
         urdf = urdf.replace(f'<origin xyz="{xyz}"/><axis xyz="{axis}"',
                             f'<origin xyz="{moved}" /><axis xyz="{about}"')
-    with pytest.raises(LegsError, match=r'say that y is up, and z is to be \(REP 103\)'):
+    with pytest.raises(LegsError, match=r'y is up, but z must be \(REP 103\)'):
         legs_of(urdf)
 
 
@@ -180,7 +180,7 @@ def test_legs_of_any_names_are_told_by_their_places(names):
 
 def test_a_robot_that_faces_backward_is_refused_with_the_remedy():
     urdf = quadruped(places={leg: (-x, -y) for leg, (x, y) in QUADRUPED.items()})
-    with pytest.raises(LegsError, match=r'faces -x .* names .* --forward=-x makes.*--forward x'):
+    with pytest.raises(LegsError, match=r'faces -x .* names .* --forward=-x writes.*--forward x'):
         legs_of(urdf)
     assert legs_of(urdf, True)['lf'][0] == 'rear_right_hip'
 
@@ -195,7 +195,7 @@ def test_names_on_the_wrong_side_are_refused_and_can_be_overruled():
 
 def test_a_robot_that_faces_y_is_refused_with_the_remedy():
     places = {leg: (-y, x) for leg, (x, y) in QUADRUPED.items()}
-    with pytest.raises(LegsError, match=r'faces y .* axes .*--forward=y makes'):
+    with pytest.raises(LegsError, match=r'faces y .* axes .*--forward=y writes'):
         legs_of(quadruped(places=places, crosswise=True))
 
 
@@ -208,7 +208,7 @@ def test_where_a_robot_faces_does_not_depend_on_the_zeros_of_its_hips(zero, cros
         {leg: str(k) for k, leg in enumerate(QUADRUPED)}, crosswise=crosswise))
     assert urdf.count('rpy') == 4
     if crosswise:
-        with pytest.raises(LegsError, match='faces y or -y of the URDF'):
+        with pytest.raises(LegsError, match='faces y or -y in the URDF'):
             legs_of(urdf)
     else:
         assert list(legs_of(urdf)) == list(QUADRUPED)

@@ -78,7 +78,7 @@ class ServoBridge(BridgeNode):
     def dry_report(self) -> str:
         """Return the distances that the servos would move."""
         away = np.abs(self.supervisor.command.q - self._state.q).max()
-        return f'the largest way to a commanded angle would be {away:.2f} rad'
+        return f'the largest movement to a commanded angle would be {away:.2f} rad'
 
 
 def main(args: list[str] | None = None) -> int:

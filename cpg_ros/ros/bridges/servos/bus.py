@@ -113,13 +113,13 @@ SPECS = fixed({
     'no_position_feedback': Spec(False, 'drive servos that do not report their position, as those '
                                  'of a PCA9685; the first command moves them at full speed unless '
                                  'the robot lies in its rest pose'),
-    'rate': Spec(50.0, 'times that servos are commanded, and asked where they are, a second [Hz]',
+    'rate': Spec(50.0, 'rate at which servos are commanded and their positions read [Hz]',
                  10.0, 200.0),
     'command_timeout': Spec(0.5, 'time without a command after which servo torque is disabled [s]',
                             0.05, 5.0),
-    'end_timeout': Spec(0.0, 'time for which Ctrl-C or SIGTERM waits for the commands to stop, as '
-                        'they do when the bridge has made the robot sit down [s]; 0 disables '
-                        'servo torque at once', 0.0, 30.0)})
+    'end_timeout': Spec(0.0, 'after Ctrl-C or SIGTERM, longest wait for the bridge to make the '
+                        'robot sit down and end its commands [s]; 0 disables servo torque at '
+                        'once', 0.0, 30.0)})
 #: Least time between two warnings that a servo does not answer, s.
 WARNING_PERIOD = 5.0
 #: QUEUE_DEPTH: most commands that wait for a tick.
