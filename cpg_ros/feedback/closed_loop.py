@@ -71,7 +71,7 @@ class Senses(NamedTuple):
     each.
 
     Attributes:
-        monitors: see input_checks.BELIEVED, shape (inputs, NUMBERS).
+        monitors: see input_checks.LAST_VALID, shape (inputs, NUM_VALUES).
         news: 1 for a new message with the same numbers, 2 for one with others, else 0, (inputs,).
         stamps: of the messages, s, NaN without, (inputs,).
         unreadable: verdict on messages of a layout that cannot be used, else 0, (inputs,).
@@ -184,8 +184,9 @@ def check_inputs(senses, sensors, legs, now, moving):
 #: Indices of a loop's state. REQUESTED: whether feedback is requested; OFF_TIME: time for which
 #: its fraction has been 0, s; FRACTION: of the correction that acts; PROGRESS, GOOD_TIME: see
 #: fade; AGREEMENT: mean fraction of legs whose contacts agree with the gait; NUM_FAILED: number of
-#: inputs that are out; MOUNT: index of the IMU's mount in leg_rates.MOUNTED; CONTACTS_DISAGREE:
-#: whether contacts disagree; ACTIVE: whether feedback acts. STATE_SIZE is the number of these.
+#: inputs that are out; MOUNT: index of the IMU's mount in leg_rates.MOUNT_TEXTS;
+#: CONTACTS_DISAGREE: whether contacts disagree; ACTIVE: whether feedback acts. STATE_SIZE is the
+#: number of these.
 (REQUESTED, OFF_TIME, FRACTION, PROGRESS, GOOD_TIME, AGREEMENT, NUM_FAILED, MOUNT,
  CONTACTS_DISAGREE, ACTIVE, STATE_SIZE) = range(11)
 #: Indices of an instant. DT: length of the tick, s; TIME: time, s; RAMP: of the ramp, 0 to 1;

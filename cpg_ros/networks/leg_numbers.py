@@ -46,7 +46,7 @@ def pairs(legs: int) -> tuple[str, ...]:
     """Return the names of the pairs of legs, hindmost first.
 
     Raises:
-        InputError: the number is not even, or not from 2 to MOST.
+        InputError: the number is not even, or not from 2 to MAX_LEGS.
 
     """
     if legs % 2 or not 2 <= legs <= MAX_LEGS:

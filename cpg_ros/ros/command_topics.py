@@ -59,7 +59,7 @@ class KpScaleSubscription:
         self._scale, self._received = 1.0, 0.0
 
     def receive(self, now: float) -> float:
-        """Return the factor, from 1 to LARGEST; 1 if the last message is out of range or old.
+        """Return the factor, from 1 to MAX_KP_SCALE; 1 if the last message is out of range or old.
 
         Args:
             now: s, from any origin.

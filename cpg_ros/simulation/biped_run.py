@@ -121,7 +121,7 @@ class BipedRun:
         Args:
             duration: s.
             commands: each (s, m/s forward, m/s left, rad/s); with NaN as a speed it stands.
-            pushes: each (s, N forward, N left) on the base for PUSH seconds.
+            pushes: each (s, N forward, N left) on the base for PUSH_DURATION seconds.
             feedback: of the robot, not used before; one with its own gains if not given.
             seed: of the noise.
             gaits: each (s, gait) to change to then; the first one is the feedback's own.

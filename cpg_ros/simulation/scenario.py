@@ -118,7 +118,7 @@ class Outcome(ShortRepr):
         phase: of the first leg, cycles, shape (runs, steps).
         kp_scale: factor of the servos' proportional gain, shape (runs, steps).
         stiff: 1 while the feedback stiffens servos, by gains or targets, else 0, the same.
-        cost: of transport after BEGINNING, shape (runs,).
+        cost: of transport after run_metrics.SETTLING_TIME, shape (runs,).
 
     """
 
