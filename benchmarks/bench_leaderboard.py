@@ -16,9 +16,9 @@
 
 Policies are files of public repositories, in checkouts that environment variables name
 (leaderboard/policies.yaml has them); where one is missing, its entry says what it lacks. They need
-onnxruntime or torch. ``--go1`` is a robot file that ``tune --robot unitree_go2 --model go1 --gait
-trot --out go1.yaml`` has written. ``--plain`` gives all robots joints without friction, as the
-policies have had in training; else joints are as measured on the robots.
+onnxruntime or torch. ``--go1`` is a robot file that ``tune`` has written (docs/leaderboard.md).
+``--plain`` gives all robots joints without friction, as the policies have had in training; else
+joints are as measured on the robots.
 """
 
 import argparse
