@@ -238,9 +238,9 @@ import rclpy
 from rclpy.logging import get_logger
 
 if sys.argv[1] == 'copied':
-    from cpg_ros.ros.node.console import never_wait, TO_STREAM
+    from cpg_ros.ros.node.console import never_wait, STREAM_ARGUMENTS
     never_wait('name', sys.argv[2:])
-    rclpy.init(args=[*sys.argv[2:], *TO_STREAM])
+    rclpy.init(args=[*sys.argv[2:], *STREAM_ARGUMENTS])
 else:
     rclpy.init(args=sys.argv[2:])
 logger = get_logger('some.name')
