@@ -90,8 +90,8 @@ def is_out(monitor, now):
         if math.isnan(monitor[AGE]):
             monitor[AGE] = age
         else:
-            share = min((now - monitor[LAST_UPDATE]) / AGE_FILTER, 1.0)
-            monitor[AGE] += share * (age - monitor[AGE])
+            fraction = min((now - monitor[LAST_UPDATE]) / AGE_FILTER, 1.0)
+            monitor[AGE] += fraction * (age - monitor[AGE])
             if monitor[PEAK_HOLD]:
                 monitor[AGE] = max(monitor[AGE], age)
         monitor[LAST_UPDATE] = now

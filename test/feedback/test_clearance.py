@@ -17,7 +17,7 @@
 import importlib.util
 
 from cpg_ros.feedback.gains import Gains
-from go2 import program
+from go2 import gait_plan
 import numpy as np
 import pytest
 
@@ -35,7 +35,7 @@ GAINS = Gains()
 @pytest.mark.parametrize('gait', ['trot', 'walk'])
 def test_stairs_are_climbed_with_feet_lifted_higher(gait):
     """Up and down steps of 10 cm; on flat ground the law changes no bit."""
-    loop = ClosedLoopBatch('go2', program(gait))
+    loop = ClosedLoopBatch('go2', gait_plan(gait))
     trials = [Scenario(friction, speed={'trot': 0.3, 'walk': 0.4}[gait], phase=k / 16,
                        terrain=Terrain('stairs', 0.10))
               for k, friction in enumerate(np.linspace(0.6, 1.0, 16))]

@@ -28,7 +28,7 @@ from cpg_ros.feedback.tick import PlannedMotion
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.strides import StrideCommand
 from depth import examples
-from go2 import displace, DT, GO2, inverse, jacobian, program
+from go2 import displace, DT, gait_plan, GO2, inverse, jacobian
 from hypothesis import given
 from hypothesis import strategies as st
 import numpy as np
@@ -51,7 +51,7 @@ REACHED = st.tuples(st.floats(-0.1, 0.1), st.floats(-0.08, 0.08), st.floats(-0.0
 
 @pytest.fixture(scope='module')
 def loop():
-    return ClosedLoopBatch('go2', program('trot'))
+    return ClosedLoopBatch('go2', gait_plan('trot'))
 
 
 @pytest.fixture(scope='module')
@@ -226,7 +226,7 @@ def test_a_body_that_rolls_to_the_right_steps_to_the_right(loop):
     """A positive rate of roll falls to the right, where y is negative."""
     gains = Gains()._replace(step_roll_rate=0.1, step=0.0, step_left=0.0, step_pitch_rate=0.0,
                              give=0.0, give_left=0.0)
-    made, feedback = program('trot'), Feedback(loop.geometry, gains)
+    made, feedback = gait_plan('trot'), Feedback(loop.geometry, gains)
     feedback.learn(made)
     rolling = standing([0.0] * 4)
     rolling.angular_velocity[0, 0] = 1.0
@@ -242,7 +242,7 @@ def test_a_body_that_rolls_to_the_right_steps_to_the_right(loop):
 
 def patterns(loop, expected, gains, steps=1500):
     """Return angles and speeds told, ticks held by a limit and the place, m, of a real pattern."""
-    made = program('trot')
+    made = gait_plan('trot')
     body = Body('go2', GO2)
     pattern = Pattern(made, strides=StrideCommand(4))
     pattern.steer(*made.steer(0.4, 0.0))
@@ -287,13 +287,13 @@ def test_a_real_pattern_walks_as_those_of_many_runs(loop, expected):
 
 
 def test_a_drive_taken_in_mid_walk_changes_no_bit():
-    one, other = Pattern(program('trot')), Pattern(program('trot'))
+    one, other = Pattern(gait_plan('trot')), Pattern(gait_plan('trot'))
     for k in range(1500):
         if k == 700:
             one.attach(StrideCommand(4))
         if k == 1000:
             for pattern in (one, other):
-                pattern.apply(program('walk'), 0.5)
+                pattern.apply(gait_plan('walk'), 0.5)
         for pattern in (one, other):
             pattern.advance(DT)
         assert (one.position == other.position).all() and (one.velocity == other.velocity).all()
@@ -336,7 +336,7 @@ def test_the_closed_trot_climbs_where_the_open_one_falls(loop, expected):
 
 
 def test_the_closed_walk_climbs_straight():
-    loop = ClosedLoopBatch('go2', program('walk'))
+    loop = ClosedLoopBatch('go2', gait_plan('walk'))
     ran = loop.run([Scenario(0.8, terrain=Terrain('ramp', 15.0), phase=phase)
                     for phase in (0.2, 0.7)], 25.0, gains=GAINS, goal=2.5)
     assert np.isfinite(ran.arrived).all() and np.abs(ran.place[:, :, 1]).max() < 0.5
@@ -355,7 +355,7 @@ def test_ground_is_flat_at_the_start_and_as_high_as_it_says(kind):
 
 def test_a_gait_that_sways_keeps_its_frequency(loop):
     """Undisturbed, the pace ran at twice its frequency: its sway at one passed for a push."""
-    swaying = program('pace')
+    swaying = gait_plan('pace')
     ran = ClosedLoopBatch('go2',
                           swaying).run([Scenario(phase=k / 3) for k in range(3)], 10.0, GAINS)
     strides = np.diff(np.unwrap(2.0 * np.pi * ran.phase, axis=1)[:, [2500, -1]], axis=1)
@@ -365,7 +365,7 @@ def test_a_gait_that_sways_keeps_its_frequency(loop):
 
 def test_wishes_switches_and_dull_senses_reach_the_runs(loop, expected):
     """To the left while it walks, turning, and another gait; then once more with dull senses."""
-    loop = ClosedLoopBatch('go2', program('trot'), program('walk'))
+    loop = ClosedLoopBatch('go2', gait_plan('trot'), gait_plan('walk'))
     wishes = [Scenario(speed=0.3, commands=((1.5, 0.3, 0.1, 0.0),)),
               Scenario(speed=0.3, commands=((1.5, 0.3, 0.0, 0.3),)),
               Scenario(speed=0.3, switches=((1.5, 'walk'),))]
@@ -377,4 +377,4 @@ def test_wishes_switches_and_dull_senses_reach_the_runs(loop, expected):
         assert ran.angular_velocity[1, late, 2].mean() == pytest.approx(0.3, abs=0.1)
         # Strides a second are those of the walk, which is not hurried for its own sway.
         strides = (np.diff(ran.phase[2, -500:]) % 1.0).sum()
-        assert strides == pytest.approx(program('walk').frequency, rel=0.15)
+        assert strides == pytest.approx(gait_plan('walk').frequency, rel=0.15)

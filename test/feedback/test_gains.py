@@ -21,11 +21,11 @@ from cpg_ros.feedback.gains import GAINS, Gains, LAWS
 from cpg_ros.feedback.kinematics import geometry_of
 from cpg_ros.feedback.tick import PlannedMotion
 from cpg_ros.ros.feedback.switch import PREFIX, SPECS
-from go2 import DT, GO2, program
+from go2 import DT, gait_plan, GO2
 import numpy as np
 import pytest
 
-TROT = program('trot')
+TROT = gait_plan('trot')
 
 
 def corrected(gains):

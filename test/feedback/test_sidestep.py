@@ -19,7 +19,7 @@ import importlib.util
 from cpg_ros.feedback.gains import Gains
 from cpg_ros.feedback.laws import sidestep
 from cpg_ros.feedback.laws.law import low_passed
-from go2 import DT, program
+from go2 import DT, gait_plan
 import numpy as np
 import pytest
 
@@ -34,7 +34,7 @@ GAINS = Gains()
 
 @pytest.fixture(scope='module')
 def loop():
-    return ClosedLoopBatch('go2', program('trot'))
+    return ClosedLoopBatch('go2', gait_plan('trot'))
 
 
 def test_what_is_missing_is_asked_for_up_to_a_share_of_what_is_wanted():

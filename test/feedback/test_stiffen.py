@@ -18,7 +18,7 @@ import importlib.util
 import math
 
 from cpg_ros.feedback.gains import Gains
-from go2 import DT, program
+from go2 import DT, gait_plan
 import numpy as np
 import pytest
 
@@ -35,7 +35,7 @@ GAINS = Gains()
 
 @pytest.fixture(scope='module')
 def loop():
-    return ClosedLoopBatch('go2', program('trot'))
+    return ClosedLoopBatch('go2', gait_plan('trot'))
 
 
 @pytest.fixture(scope='module')
@@ -106,7 +106,7 @@ def test_late_senses_leave_positions_alone(loop, expected):
 
 @pytest.mark.deep
 def test_a_walk_that_yields_while_it_recovers_survives_more_pushes_from_the_side():
-    walks = ClosedLoopBatch('go2', program('walk'))
+    walks = ClosedLoopBatch('go2', gait_plan('walk'))
     ways, phases = np.random.default_rng(10).uniform([[-0.26], [0.0]], [[0.26], [1.0]], (2, 96))
     trials = [Scenario(phase=phase, pushes=(impulse(
         1.6, 42.0 * math.sin(way), (1 - 2 * (k % 2)) * 42.0 * math.cos(way)),))

@@ -23,7 +23,7 @@ import math
 
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.strides import StrideCommand
-from go2 import DT, GO2, program
+from go2 import DT, gait_plan, GO2
 import numpy as np
 import pytest
 from switches import tour
@@ -60,7 +60,7 @@ def test_limits_are_those_of_the_model():
 
 @pytest.mark.parametrize('network', ['delayed', 'quadruped'])
 def test_every_gait_goes_far_enough_upright_and_straight(batch, network):
-    trials = batch.run([(targets(program(gait, network), 10.0, DT), Scenario()) for gait in FAR])
+    trials = batch.run([(targets(gait_plan(gait, network), 10.0, DT), Scenario()) for gait in FAR])
     for (gait, far), trial in zip(FAR.items(), trials, strict=True):
         assert trial.upright and trial.distance >= far, (gait, trial)
         assert abs(trial.heading) <= 20.0, (gait, trial)
@@ -71,7 +71,7 @@ def test_every_gait_goes_far_enough_upright_and_straight(batch, network):
 
 @pytest.mark.parametrize('force', [20.0, 60.0])
 def test_no_push_makes_trot_fall(batch, force):
-    angles = targets(program('trot'), 5.0, DT)
+    angles = targets(gait_plan('trot'), 5.0, DT)
     runs = []
     for seed in range(20):
         rng = np.random.default_rng(seed)
@@ -86,17 +86,17 @@ def test_a_tour_of_all_switches_does_not_make_it_fall(body):
     """An Eulerian circuit: every ordered pair of gaits once, 2.5 s each."""
     way = tour(sorted(FAR))
     assert len(set(pairwise(way))) == 30 == len(way) - 1
-    walk = Follow(body, Pattern(program(way[0])))
+    walk = Follow(body, Pattern(gait_plan(way[0])))
     walk.go(2.5)
     for gait in way[1:]:
-        walk.pattern.apply(program(gait), 1.0)
+        walk.pattern.apply(gait_plan(gait), 1.0)
         walk.go(2.5)
     assert walk.pattern.faults == 0
 
 
 def asked(body, gait, forward, turn):
     """Ask as cmd_vel does; return speed and yaw rate over 6 s."""
-    made = program(gait)
+    made = gait_plan(gait)
     pattern = Pattern(made, strides=StrideCommand(4))
     pattern.steer(*made.steer(forward, turn))
     walk = Follow(body, pattern)

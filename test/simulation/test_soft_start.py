@@ -18,7 +18,7 @@ import importlib.util
 
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.simulation.body import Approach, Body, FOLLOWED_DISTANCE
-from go2 import DT, GO2, program
+from go2 import DT, gait_plan, GO2
 from hypothesis import given
 from hypothesis import strategies as st
 import numpy as np
@@ -71,7 +71,7 @@ def test_it_begins_anew_where_it_is_put():
                     reason='the extra [sim] is not installed')
 @pytest.mark.parametrize('gait', ['walk', 'trot', 'pace', 'bound', 'jump', 'pronk'])
 def test_a_gait_in_full_swing_is_taken_up_at_any_moment(gait):
-    body, running = Body('go2', GO2), program(gait)
+    body, running = Body('go2', GO2), gait_plan(gait)
     for part in np.arange(5) / 5:
         pattern = Pattern(running, 0.0, True)
         for _ in range(round((1.0 + part / running.frequency) / DT)):

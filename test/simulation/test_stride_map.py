@@ -19,7 +19,7 @@ import importlib.util
 from cpg_ros.common.errors import InputError
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.feedback.gains import Gains
-from go2 import program
+from go2 import gait_plan
 import numpy as np
 import pytest
 
@@ -33,7 +33,7 @@ from cpg_ros.simulation.stride_map import stride_map
 
 @pytest.fixture(scope='module')
 def trot():
-    return stride_map('go2', program('trot'), Gains())
+    return stride_map('go2', gait_plan('trot'), Gains())
 
 
 def test_one_multiplier_is_that_of_the_phase_and_the_walk_attracts(trot):
@@ -42,13 +42,13 @@ def test_one_multiplier_is_that_of_the_phase_and_the_walk_attracts(trot):
     # All but the force of a foot, which differs by what contact makes of 1e-5 m.
     still = [not name.startswith('foot force') for name in trot.names]
     assert np.abs(trot.change[still]).max() < 0.05
-    plan = program('trot')
+    plan = gait_plan('trot')
     assert trot.network.leading == multipliers(plan.orbit, plan.gain).leading
 
 
 def test_small_pushes_decay_as_the_slowest_multiplier_that_they_excite_says(trot):
     ticks, begin, first, last = round(trot.stride / 0.002), 30, 35, 45
-    loop = ClosedLoopBatch('go2', program('trot'), timestep=trot.stride / ticks)
+    loop = ClosedLoopBatch('go2', gait_plan('trot'), timestep=trot.stride / ticks)
     pushes = [(0.1, 0.0), (-0.05, 0.1), (0.0, -0.1), (0.5, 0.2)]
     pushed = loop.run([Scenario(), *(Scenario(pushes=(impulse(begin * trot.stride, *push),))
                                      for push in pushes)],
@@ -72,10 +72,10 @@ def test_a_body_that_falls_has_no_stride(monkeypatch):
     # No gait of the Go2 falls by itself: let a tilt of 1e-4 rad count as a fall.
     monkeypatch.setattr('cpg_ros.simulation.stride_map.MAX_LEAN', 1e-4)
     with pytest.raises(InputError, match='the trot falls within 3 strides'):
-        stride_map('go2', program('trot'), None, settling=3)
+        stride_map('go2', gait_plan('trot'), None, settling=3)
 
 
 def test_a_stride_that_the_feedback_shortens_is_refused():
     # The walk's strides cannot be as long as 0.4 m/s takes.
     with pytest.raises(InputError, match=r'at 0\.4 m/s the feedback changes the frequency'):
-        stride_map('go2', program('walk'), Gains())
+        stride_map('go2', gait_plan('walk'), Gains())

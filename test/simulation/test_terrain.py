@@ -17,7 +17,7 @@
 import importlib.util
 
 from cpg_ros.feedback.gains import Gains
-from go2 import program
+from go2 import gait_plan
 import numpy as np
 import pytest
 
@@ -31,7 +31,7 @@ from cpg_ros.simulation.terrain import Terrain
 
 @pytest.fixture(scope='module')
 def walk():
-    return ClosedLoopBatch('go2', program('walk'))
+    return ClosedLoopBatch('go2', gait_plan('walk'))
 
 
 def test_a_field_of_half_a_millimetre_is_as_the_plane(walk):
@@ -76,7 +76,7 @@ def test_steps_have_edges_and_lead_up_and_down(walk):
 
 def test_the_trot_goes_up_twenty_degrees():
     """3 m from eight phases; with the feet as far ahead as downhill, most of them do not."""
-    trot = ClosedLoopBatch('go2', program('trot'))
+    trot = ClosedLoopBatch('go2', gait_plan('trot'))
     ran = trot.run([Scenario(friction, terrain=Terrain('ramp', 20.0), phase=k / 4)
                     for friction in (0.8, 1.0) for k in range(4)], 15.0, Gains(), goal=3.0)
     assert np.isfinite(ran.arrived).sum() >= 7

@@ -29,7 +29,7 @@ from cpg_ros.ros.feedback.sensor_input import SensorInput
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.scenario import SensorNoise
 from cpg_ros.simulation.sensors import SimulatedSensors
-from go2 import DT, GO2, program
+from go2 import DT, gait_plan, GO2
 import numpy as np
 from sensor_faults import BEGINS, FaultySensors, Measured, Wire
 
@@ -64,7 +64,7 @@ class FaultyGo2:
                  begins: float = BEGINS, **settings: object) -> None:
         """Stand; begins in s, settings as of SensorInput."""
         settings.setdefault('latest', MAX_AGE)
-        self.gait = program(gait)
+        self.gait = gait_plan(gait)
         self.body = Body('go2', GO2)
         self._unit = SimulatedSensors(self.body, DT, SensorNoise(
             gyroscope_noise=0.02, accelerometer_noise=0.2, orientation_bias=0.008, seed=seed))

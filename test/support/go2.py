@@ -30,7 +30,7 @@ DT = 0.002
 
 
 @cache
-def program(gait, network='delayed'):
+def gait_plan(gait, network='delayed'):
     """Return a gait at the frequency that the robot file has for it."""
     preset = PRESETS[network][gait]
     return plan(GO2, gait, preset, preset.network, GO2.motion(gait, gait).frequency)

@@ -182,8 +182,8 @@ def _level(memory, axes, fractions, aside, step):
         left += fractions[leg] * (c * y - s * x)
         height += fractions[leg] * (center[2] - soles[leg, 2])
     speed = c * velocity[1] - s * velocity[0]
-    laws.roll_error = support.roll_error(laws.roll_error, left / max(height, 0.3),
-                                         speed - laws.left_speed, step)
+    lean = left / max(height, stepping.MIN_COM_HEIGHT)
+    laws.roll_error = support.roll_error(laws.roll_error, lean, speed - laws.left_speed, step)
     laws.left_speed = speed
 
 

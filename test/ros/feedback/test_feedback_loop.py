@@ -30,7 +30,7 @@ from cpg_ros.ros.feedback.loop import FeedbackLoop
 from cpg_ros.ros.feedback.sensor_input import SensorInput
 from depth import in_depth
 from geometry_msgs.msg import WrenchStamped
-from go2 import DT, GO2, program
+from go2 import DT, gait_plan, GO2
 import numpy as np
 import pytest
 from rclpy.serialization import serialize_message
@@ -93,7 +93,7 @@ class Robot:
     def __init__(self, monkeypatch, contacts='foot_contacts', lag=0, **dull):
         monkeypatch.setattr(sensor_input, 'PolledSubscription', Wire)
         Wire.wires = {}
-        made = program('trot')
+        made = gait_plan('trot')
         self.body = Body('go2', GO2)
         self.unit = SimulatedSensors(self.body, DT, SensorNoise(**dull))
         self.pattern = Pattern(made, 0.4, strides=StrideCommand(4))
@@ -236,7 +236,7 @@ def test_at_full_speed_strides_are_not_hurried(monkeypatch):
             strides += (phase - before) % 1.0 if k * DT >= 2.0 else 0.0
             before = phase
         assert not robot.body.fallen and robot.loop.fraction == 1.0
-        assert strides / 3.0 == pytest.approx(program('trot').frequency, rel=0.05)
+        assert strides / 3.0 == pytest.approx(gait_plan('trot').frequency, rel=0.05)
 
 
 def test_the_closed_loop_survives_the_push_that_fells_the_open_one(monkeypatch):
@@ -273,7 +273,7 @@ def test_targets_go_too_far_after_a_push_where_measurements_are_young(monkeypatc
 
 
 def test_switched_off_from_the_start_nothing_changes_bit_for_bit(monkeypatch):
-    robot, alone = Robot(monkeypatch), Pattern(program('trot'), 0.4)
+    robot, alone = Robot(monkeypatch), Pattern(gait_plan('trot'), 0.4)
     robot.loop.enabled = False
     for _ in range(1000):
         robot.tick()

@@ -18,7 +18,7 @@ from dataclasses import replace
 import importlib.util
 
 from bags import joint_state, START, STORE, write_bag
-from go2 import DT, GO2, program
+from go2 import DT, gait_plan, GO2
 import numpy as np
 import pytest
 from rosbags.rosbag2 import StoragePlugin, Writer
@@ -55,7 +55,7 @@ def packed(name, *values):
 @pytest.fixture(scope='module')
 def messages():
     """Return what a robot that trots at 0.4 m/s, its servos and its generator publish."""
-    made, kinds, found = program('trot'), STORE.types, []
+    made, kinds, found = gait_plan('trot'), STORE.types, []
     body, pattern = Body('go2', GO2), Pattern(made, strides=StrideCommand(4))
     pattern.steer(*made.steer(0.4, 0.0))
     feel, unknown = Proprioception(body), np.zeros(9)
@@ -195,7 +195,7 @@ def test_a_gait_that_cannot_be_has_its_own_code_whatever_the_error_is_called(
 
 def test_a_run_that_falls_does_not_enter_a_copy():
     # Servos without damping: this trot steps in place, and falls at 0.4 m/s and faster.
-    loop = ClosedLoopBatch('go2', program('trot'), kp=200.0, kd=0.1)
+    loop = ClosedLoopBatch('go2', gait_plan('trot'), kp=200.0, kd=0.1)
     measured = measure_efference(loop, (0.0, 0.4))
     assert measured.speeds == pytest.approx([0.0], abs=0.05)
     with pytest.raises(InputError, match=r"'trot' has no efference copy.*falls at each"):

@@ -24,7 +24,7 @@ from cpg_ros.motion.plan import gait_of
 from cpg_ros.motion.strides import StrideCommand
 from cpg_ros.networks.registry import PRESETS
 from depth import examples
-from go2 import DT, GO2, program
+from go2 import DT, gait_plan, GO2
 from hypothesis import given
 from hypothesis import strategies as st
 import numpy as np
@@ -72,12 +72,12 @@ def in_order(pattern):
        pace=st.floats(0.5, 1.0))
 def test_targets_are_what_the_generator_publishes(gait, ramp, strides, pace):
     """Run tick by tick through the network, with a stride command or none, for long enough."""
-    found = targets(program(gait), 3.0, DT, strides or (), pace, ramp)
+    found = targets(gait_plan(gait), 3.0, DT, strides or (), pace, ramp)
     command = None
     if strides or pace != 1.0:
         command = StrideCommand(4)
         command.set_target(np.array(strides or [1.0] * 4), pace, at_once=True)
-    pattern, published = Pattern(program(gait), ramp, strides=command), np.empty_like(found)
+    pattern, published = Pattern(gait_plan(gait), ramp, strides=command), np.empty_like(found)
     for row in published:
         pattern.advance(DT)
         row[:] = in_order(pattern)
@@ -85,7 +85,7 @@ def test_targets_are_what_the_generator_publishes(gait, ramp, strides, pace):
 
 
 def test_a_batch_is_many_bodies_stepped_one_by_one(batch):
-    angles = targets(program('trot'), 2.5, DT)
+    angles = targets(gait_plan('trot'), 2.5, DT)
     push = (1.5, 20.0, -40.0)
     trial = batch.run([(angles, Scenario()), (angles, Scenario(pushes=(push,)))])[1]
     body = Body('go2', GO2)
@@ -111,7 +111,7 @@ def roll(body):
 
 
 def test_what_is_met_matters(batch):
-    angles = targets(program('trot'), 4.0, DT)
+    angles = targets(gait_plan('trot'), 4.0, DT)
     usual, slippery, pushed = batch.run([
         (angles, Scenario()), (angles, Scenario(friction=0.1)),
         (angles, Scenario(pushes=((2.0, 0.0, 900.0),)))])
@@ -209,7 +209,7 @@ def test_the_fit_finds_weights_again():
 def test_shipped_feet_go_where_a_foot_should(gait, network):
     """What is published, through MuJoCo's kinematics: lifted, and both sides alike."""
     feet, ways = _feet(), {}
-    moved = program(gait, network)
+    moved = gait_plan(gait, network)
     angles = moved.readout.angles + (GO2.column('offset') + moved.shift)[:, None]
     data = mujoco.MjData(feet.body.model)
     phase = {leg: np.arange(512) for leg in FEET}
