@@ -233,7 +233,7 @@ def test_a_wrong_entry_is_named(tmp_path, place, value, why):
 
 
 def test_beyond_full_strides_legs_are_faster_as_far_as_joints_go():
-    slow, preset = go2.program('trot'), PRESETS['delayed']['trot']
+    slow, preset = go2.gait_plan('trot'), PRESETS['delayed']['trot']
     fast = plan(go2.GO2, 'trot', preset, preset.network, 2.9)
     table = slow.motion.steering
     assert table.stride[-1] == 1.0 and table.frequency[-1] > slow.motion.frequency

@@ -178,7 +178,7 @@ def test_joints_that_lag_their_cells_are_told(seed):
     recording = Recording(tuple(QUADRUPED.order), times,
                           angles + rng.normal(0.0, 0.005, angles.shape), source='lagging calves')
     found = fit_recording(recording, QUADRUPED, free=['tau'])
-    told = [re.search('tau may be from (.*) to (.*) if joints of a leg lag', line)
+    told = [re.search('tau may be from (.*) to (.*) if the joints of a leg lag', line)
             for line in found.warnings]
     low, high = next(map(float, one.groups()) for one in told if one)
     assert low <= 0.4 <= high

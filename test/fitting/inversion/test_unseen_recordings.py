@@ -280,7 +280,7 @@ def test_a_limp_is_said(tmp_path, capsys):
     angles[:, 4:6] += 0.7 * (angles[:, 4:6].mean(axis=0) - angles[:, 4:6])
     said = said_of(capsys, '--csv', table_of(tmp_path / 'walk.csv', names, t, angles))
     assert trot_found(said)
-    assert any(note.startswith('lf moves by 0.3') for note in said['notes'])
+    assert any(note.startswith('lf moves 0.3') for note in said['notes'])
 
 
 @pytest.mark.parametrize('joint', range(4, 6))

@@ -51,7 +51,7 @@ def test_a_walk_that_is_kept_is_named_by_its_inversion(name):
     for leg, fraction in truth['duty'].items():
         assert found.stride.contacts.duty[leg] == pytest.approx(fraction, abs=0.1)
     # Joints gave way to the loads by nobody knows how much; commands did not.
-    assert any(line.startswith('feet bore loads: ') and line.endswith('tau: cannot tell')
+    assert any(line.startswith('feet bore loads, ') and line.endswith('tau: cannot tell')
                for line in found.warnings)
     assert not found.fit.parameters['tau'].bounded
     # By what joints did, and by what their servos were sent.
