@@ -96,7 +96,7 @@ class Client:
         if message['type'] == 'frame':
             self.frame.update(message)
             self.frames += 1
-        elif message['type'] == 'said':
+        elif message['type'] == 'notice':
             self.said.append(message['text'])
         elif message['type'] == 'values':
             for one in self.last['controls']['controls']:

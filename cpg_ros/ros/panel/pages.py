@@ -244,5 +244,5 @@ class Pages:
         self.send(ready, {**message, 'stamp': stamp})
 
     def notify(self, pages: Iterable[Page], text: str, kind: str = 'refused') -> None:
-        """Show a line of text; ``kind`` is refused or told."""
-        self.send(pages, {'type': 'said', 'text': text[:1000], 'kind': kind})
+        """Show a line of text; ``kind`` is refused or info."""
+        self.send(pages, {'type': 'notice', 'text': text[:1000], 'kind': kind})

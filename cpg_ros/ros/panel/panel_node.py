@@ -268,7 +268,7 @@ class RequestHandler:
 
         """
         other = NodeClient(self._services, node)
-        self._pages.notify([page], await other.command(kind, service, timeout, **fields), 'told')
+        self._pages.notify([page], await other.command(kind, service, timeout, **fields), 'info')
 
     async def _record(self, view: RobotView, on: bool) -> None:
         if on:
@@ -276,7 +276,7 @@ class RequestHandler:
             bag = self._recorder.start(
                 (topic, kind) for topic, kind in view.graph.topics
                 if topic in GLOBAL_TOPICS or topic.startswith(f'{space}/'))
-            self._pages.notify(self._pages.open, f'recording to {bag}', 'told')
+            self._pages.notify(self._pages.open, f'recording to {bag}', 'info')
         else:
             await asyncio.to_thread(self._recorder.stop)
         self._recorded()
@@ -500,7 +500,7 @@ class Panel(StartedNode):
             raise RequestError(f"there is no generator '{name}'")
         self._gone(page)
         page.node = name
-        self._pages.send([page], {'type': 'chosen', 'node': name})
+        self._pages.send([page], {'type': 'selected', 'node': name})
         if page.stop_only:
             return
         for message in view.messages():

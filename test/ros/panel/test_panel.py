@@ -261,7 +261,7 @@ def test_stop_works_on_a_managed_generator_in_every_state():
         ending.callback(watcher.end)
         page = Client(address)
         ending.callback(page.end)
-        until(lambda: page.last.get('chosen'), 'the generator')
+        until(lambda: page.last.get('selected'), 'the generator')
 
         def stopped():
             before = len(page.said)
@@ -399,9 +399,9 @@ def test_robots_in_two_namespaces_and_one_that_comes_later():
                                    domain=domain))
             name = f'{space}/cpg_generator'
             until(lambda: name in page.last['state']['generators'], name)  # noqa: B023
-        assert page.ready().last['chosen']['node'] == '/a/cpg_generator'
+        assert page.ready().last['selected']['node'] == '/a/cpg_generator'
         assert page.last['shape']['source'] == 'quadruped.urdf'
-        for one in ('chosen', 'controls', 'shape', 'names', 'gait'):
+        for one in ('selected', 'controls', 'shape', 'names', 'gait'):
             del page.last[one]
         page.send(do='choose', node='/b/cpg_generator')
         page.ready()
@@ -415,7 +415,7 @@ def test_robots_in_two_namespaces_and_one_that_comes_later():
         # The page does not turn to the other robot by itself: nobody asked to move that one.
         page.send(do='enable', on=True)
         until(lambda: page.said == ['/b/cpg_generator is gone'], 'the answer')
-        assert page.last['chosen']['node'] == '/b/cpg_generator'
+        assert page.last['selected']['node'] == '/b/cpg_generator'
     finally:
         page.end()
         for one in (*started, panel):

@@ -63,7 +63,7 @@ def robots(tmp_path):
 def test_each_panel_shows_moves_and_records_the_robot_of_its_namespace(robots):
     watcher, pages, commands = robots
     for space, page in pages.items():
-        assert page.last['chosen']['node'] == f'{space}/cpg_generator'
+        assert page.last['selected']['node'] == f'{space}/cpg_generator'
     pages['/b'].steer(0.5)
     until(lambda: 0.5 in commands['/b'], 'a command')
     # Both hold their robots, and neither sees another publisher.

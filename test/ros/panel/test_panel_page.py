@@ -140,7 +140,7 @@ def test_a_refusal_appears_with_its_reason_and_the_control_goes_back(rig, open_p
     before = field.input_value()
     field.fill('0.1')
     field.press('Enter')
-    shown = page.locator('#said p.refused')
+    shown = page.locator('#notices p.refused')
     shown.wait_for()
     assert "below the trot's critical delay" in shown.inner_text()
     until(lambda: field.input_value() == before, 'the value that is in force')
@@ -169,7 +169,7 @@ def test_the_robot_stops_when_the_page_lets_go(rig, open_page, how):
             document.dispatchEvent(new Event('visibilitychange')); }""")
     elif how == 'space':
         page.keyboard.press(' ')
-        page.locator('#said p.told', has_text='ramping down').wait_for()
+        page.locator('#notices p.info', has_text='ramping down').wait_for()
         page.locator('#enable').click()
     elif how == 'closed':
         page.close()
@@ -218,7 +218,7 @@ def test_control_is_taken_over_by_a_click_that_both_pages_see(rig, open_page):
     assert steered(rig, other, 'ArrowDown') == (-0.5, 0.0)
     # Whoever only watches can stop the robot.
     one.locator('#stop').click()
-    one.locator('#said p.told', has_text='ramping down').wait_for()
+    one.locator('#notices p.info', has_text='ramping down').wait_for()
     other.keyboard.up('ArrowDown')
     other.locator('#enable').click()
     other.locator('#release').click()
@@ -261,12 +261,12 @@ def test_the_17th_page_can_only_stop(rig, open_page, browser):
         page.goto(rig[1])
         until(lambda: '16 pages are already open: this one can only stop' in holder(page), 'why')
         page.locator('#stop').click()
-        page.locator('#said p.told', has_text='ramping down').wait_for()
+        page.locator('#notices p.info', has_text='ramping down').wait_for()
         others.pop().end()
         until(lambda: holder(page).startswith('No page has control'), 'full access')
         until(lambda: page.evaluate('panel.frames > 0'), 'frames')
         page.locator('#enable').click()
-        page.locator('#said p.told', has_text='enabled').wait_for()
+        page.locator('#notices p.info', has_text='enabled').wait_for()
     finally:
         page.close()
         for one in others:
@@ -382,7 +382,7 @@ def test_stop_and_robot_stay_in_sight(open_page, width):
     page = open_page()
     page.set_viewport_size({'width': width, 'height': 800})
     page.evaluate('scrollTo(0, 1e5); document.querySelector("aside").scrollTo(0, 1e5)')
-    for name in ('#stop', '#stage', *(['#footfalls', '#chosen'] if width > 860 else [])):
+    for name in ('#stop', '#stage', *(['#footfalls', '#selected-plot'] if width > 860 else [])):
         box = page.locator(name).bounding_box()
         assert box['y'] >= 0 and box['y'] + box['height'] <= 800, name
         assert box['x'] >= 0 and box['x'] + box['width'] <= width, name
@@ -456,8 +456,8 @@ def test_a_tour_walks_through_the_gaits_until_another_command(rig, open_page):
     def toured():
         # A page that stands still for a moment lets go of the robot, which ends the tour.
         page.evaluate("""() => { const { tour } = panel;
-            if (!tour.gaits) document.querySelector('#tour').click();
-            else tour.due = Math.min(tour.due, panel.last.time + 0.5); }""")
+            if (!tour.remaining) document.querySelector('#tour').click();
+            else tour.nextChange = Math.min(tour.nextChange, panel.latest.time + 0.5); }""")
         return {'walk', 'trot'} <= set(gaits[seen:]) and (0.4, 0.0) in rig[3]
     until(toured, 'two gaits, ahead')
     page.locator('#gaits button[data-gait=trot]').click()
@@ -468,10 +468,10 @@ def test_a_tour_walks_through_the_gaits_until_another_command(rig, open_page):
 def test_missed_frames_leave_a_gap_and_speeds_are_averaged_over_a_stride(open_page):
     page = open_page()
     lines, mean = page.evaluate("""() => { const { plots } = panel;
-        plots.frames = []; plots.paced(2);  // a stride takes 0.5 s
+        plots.frames = []; plots.setFrequency(2);  // a stride takes 0.5 s
         plots.cellCount = 1;
         for (let k = 0; k < 60; k++) if (k < 20 || k > 40)
-          plots.take({ time: 1000 + 0.025 * k, cells: [k, k],
+          plots.add({ time: 1000 + 0.025 * k, cells: [k, k],
             speed: [0.3 + Math.cos(2 * Math.PI * k / 20), 0, 1] });
         return [plots.path(plots.frames, 0), plots.speed()]; }""")
     assert lines.index(None) == 20 and lines.count(None) == 1 and lines[21] == [41, 41]
@@ -497,12 +497,12 @@ def test_shift_and_a_drag_on_the_robot_push_it(open_page):
     page.mouse.move(x, y)
     page.mouse.down()
     page.mouse.move(x + 50, y)  # seen from above with x down, to the left of the robot
-    assert page.evaluate('panel.scene.aim.visible')
+    assert page.evaluate('panel.scene.pushArrow.visible')
     page.mouse.up()
     page.keyboard.up('Shift')
     ((force, direction),) = page.evaluate('window.pushed')
     assert 20.0 < force <= 300.0 and direction == pytest.approx(90.0, abs=10.0)
-    assert not page.evaluate('panel.scene.aim.visible')
+    assert not page.evaluate('panel.scene.pushArrow.visible')
     before = page.evaluate('panel.scene.view')
     page.mouse.down()
     page.mouse.move(x, y)

@@ -17,7 +17,7 @@ export class Bridges {
     return box;
   }
 
-  take({ bridges }) {
+  update({ bridges }) {
     for (const [name, box] of Object.entries(this.parts)) {
       if (bridges[name]) continue;
       box.remove();

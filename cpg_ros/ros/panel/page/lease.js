@@ -1,7 +1,7 @@
 // Who has control of the robot, and the click that takes it over.
 
-const at = (id) => document.getElementById(id);
-const listed = new Intl.ListFormat('en-GB');
+const byId = (id) => document.getElementById(id);
+const listFormat = new Intl.ListFormat('en-GB');
 
 export class Lease {
   now = null;
@@ -12,16 +12,16 @@ export class Lease {
     return !!now && !now.stop_only && (now.yours || !now.holder) && now.confirmed;
   }
 
-  get watches() {
+  get onlyWatches() {
     return !!this.now && (this.now.stop_only || (!!this.now.holder && !this.now.yours));
   }
 
   // Why the robot does not move as steered, '' if it does.
   get reason() {
-    return !this.now || (this.steers && this.now.round_trip === null) ? '' : this.text().at(-1);
+    return !this.now || (this.steers && this.now.round_trip === null) ? '' : this.lines().at(-1);
   }
 
-  text() {
+  lines() {
     const { now } = this, lines = [];
     const holder = now.holder.replace(/^p/, 'P');
     if (now.stop_only) return ['16 pages are already open: this one can only stop the robot. '
@@ -31,7 +31,7 @@ export class Lease {
     else if (now.lost_to === now.holder) lines.push(`${holder} took over. This page only watches.`);
     else lines.push(`${holder} has control. This page only watches.`);
     if (now.others.length) {
-      lines.push(`cmd_vel is also published by ${listed.format(now.others)}${now.confirmed
+      lines.push(`cmd_vel is also published by ${listFormat.format(now.others)}${now.confirmed
         ? ': both steer.' : '. To steer, take over.'}`);
     }
     if (now.round_trip !== null) {
@@ -40,19 +40,19 @@ export class Lease {
     return lines;
   }
 
-  take(message) {
+  update(message) {
     this.now = message;
     const others = message.others.length > 0 && !message.confirmed;
     // Whoever is alone has nobody to share control with.
-    at('control').hidden = message.pages < 2 && !message.stop_only && !message.others.length
+    byId('control').hidden = message.pages < 2 && !message.stop_only && !message.others.length
       && message.round_trip === null;
-    at('control').className = message.yours ? 'yours' : this.watches ? 'other' : '';
-    at('control').classList.toggle('warn', others || message.round_trip !== null);
-    at('this-page').textContent = `this is ${message.page}`;
-    at('holder').replaceChildren(...this.text().map((textContent) =>
+    byId('control').className = message.yours ? 'yours' : this.onlyWatches ? 'other' : '';
+    byId('control').classList.toggle('warn', others || message.round_trip !== null);
+    byId('this-page').textContent = `this is ${message.page}`;
+    byId('holder').replaceChildren(...this.lines().map((textContent) =>
       Object.assign(document.createElement('p'), { textContent })));
-    at('take-over').hidden = message.stop_only || !(this.watches || others);
-    at('release').hidden = !message.yours;
-    document.body.classList.toggle('watching', this.watches);
+    byId('take-over').hidden = message.stop_only || !(this.onlyWatches || others);
+    byId('release').hidden = !message.yours;
+    document.body.classList.toggle('watching', this.onlyWatches);
   }
 }

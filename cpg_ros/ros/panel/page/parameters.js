@@ -1,6 +1,6 @@
 // A control for each parameter, made from its descriptor: gaits as buttons, ranges as sliders.
 
-const EVERY = 80;  // ms between two values of a slider that is dragged
+const SEND_PERIOD = 80;  // ms between two values of a slider that is dragged
 
 const make = (kind, properties = {}, ...children) => {
   const made = Object.assign(document.createElement(kind), properties);
@@ -9,10 +9,10 @@ const make = (kind, properties = {}, ...children) => {
 };
 
 // A preset's name for people: goat_walk is goat walk, liu2024_walk is walk (Liu 2024).
-const titled = (name) => name.replace(/^([a-z])([a-z]*)(\d{4})_(.*)$/, (_, first, rest, year, gait) =>
+const title = (name) => name.replace(/^([a-z])([a-z]*)(\d{4})_(.*)$/, (_, first, rest, year, gait) =>
   `${gait} (${first.toUpperCase()}${rest} ${year})`).replaceAll('_', ' ');
 
-const short = (value) => typeof value === 'number' ? String(+value.toPrecision(6)) : value;
+const rounded = (value) => typeof value === 'number' ? String(+value.toPrecision(6)) : value;
 
 export class Parameters {
   constructor(set) {
@@ -23,33 +23,33 @@ export class Parameters {
     this.field = document.getElementById('find');
     this.field.oninput = () => this.find(this.field.value);
     this.members = [];  // group, element and words of each parameter
-    this.known = {};
+    this.byName = {};
     this.shown = {};
     this.gaitNames = [];  // without presets of other names
   }
 
   show(controls) {
-    this.known = Object.fromEntries(controls.map((one) => [one.name, one]));
+    this.byName = Object.fromEntries(controls.map((parameter) => [parameter.name, parameter]));
     this.shown = {};
     const groups = {}, fixed = [];
     this.members = [];
-    for (const one of controls) {
-      if (one.name === 'gait' && one.choices.length) continue;
-      if (one.fixed) fixed.push(one);
-      else (groups[one.name.includes('.') ? one.name.split('.')[0] : 'general'] ??= []).push(one);
+    for (const parameter of controls) {
+      if (parameter.name === 'gait' && parameter.choices.length) continue;
+      if (parameter.fixed) fixed.push(parameter);
+      else (groups[parameter.name.includes('.') ? parameter.name.split('.')[0] : 'general'] ??= []).push(parameter);
     }
     this.place.replaceChildren(
       ...Object.entries(groups).map(([name, members]) => this.group(name, members,
-        (one) => this.control(one))),
-      this.group('read-only while the node runs', fixed, (one) => make('div',
-        { className: 'parameter' }, make('span', { textContent: one.name }),
-        make('output', { className: 'all', textContent: String(one.value) || '–' }), make('p', { textContent: one.text }))));
+        (parameter) => this.control(parameter))),
+      this.group('read-only while the node runs', fixed, (parameter) => make('div',
+        { className: 'parameter' }, make('span', { textContent: parameter.name }),
+        make('output', { className: 'all', textContent: String(parameter.value) || '–' }), make('p', { textContent: parameter.text }))));
     this.find(this.field.value);
-    const words = this.known.gait?.choices || [];
-    const presets = this.known.gait?.presets || [], untuned = this.known.gait?.untuned || [];
-    this.gaitNames = words.filter((word) => !presets.includes(word));
+    const names = this.byName.gait?.choices || [];
+    const presets = this.byName.gait?.presets || [], untuned = this.byName.gait?.untuned || [];
+    this.gaitNames = names.filter((name) => !presets.includes(name));
     const button = (gait, k) => {
-      const made = make('button', { textContent: titled(gait), onclick: () => this.set('gait', gait) });
+      const made = make('button', { textContent: title(gait), onclick: () => this.set('gait', gait) });
       made.dataset.gait = gait;
       if (untuned.includes(gait)) Object.assign(made, { className: 'untuned', title: 'not tuned for this robot' });
       if (k < 9) made.append(make('kbd', { textContent: k + 1 }));
@@ -58,15 +58,15 @@ export class Parameters {
     this.gaits.replaceChildren(...this.gaitNames.map(button));
     this.presets.replaceChildren(...presets.map((preset) => button(preset, Infinity)));
     document.getElementById('preset-group').hidden = !presets.length;
-    this.mark(this.known.gait?.value);
+    this.markGait(this.byName.gait?.value);
   }
 
   group(name, members, control) {
     const made = make('details', {}, make('summary', { textContent: `${name} ` },
       make('small', { textContent: members.length })));
-    for (const one of members) {
-      const element = control(one);
-      this.members.push({ group: made, element, words: `${one.name} ${one.text}`.toLowerCase() });
+    for (const parameter of members) {
+      const element = control(parameter);
+      this.members.push({ group: made, element, words: `${parameter.name} ${parameter.text}`.toLowerCase() });
       made.append(element);
     }
     return made;
@@ -74,71 +74,71 @@ export class Parameters {
 
   // Show the parameters whose names or descriptions have all words; with none, the closed groups.
   find(text) {
-    const wanted = text.toLowerCase().split(/\s+/).filter(Boolean), found = new Set();
+    const query = text.toLowerCase().split(/\s+/).filter(Boolean), matches = new Set();
     for (const { group, element, words } of this.members) {
-      element.hidden = !wanted.every((word) => words.includes(word));
-      if (!element.hidden) found.add(group);
+      element.hidden = !query.every((word) => words.includes(word));
+      if (!element.hidden) matches.add(group);
     }
     for (const group of this.place.children) {
-      group.hidden = !found.has(group);
-      if (wanted.length) group.open = true;
+      group.hidden = !matches.has(group);
+      if (query.length) group.open = true;
       else if (this.searched) group.open = false;
     }
-    this.searched = wanted.length > 0;
+    this.searched = query.length > 0;
   }
 
-  control(one) {
-    const named = (kind, properties, ...children) => {
+  control(parameter) {
+    const labelled = (kind, properties, ...children) => {
       const input = make(kind, properties, ...children);
-      input.setAttribute('aria-label', one.name);
-      input.dataset.parameter = one.name;
+      input.setAttribute('aria-label', parameter.name);
+      input.dataset.parameter = parameter.name;
       return input;
     };
-    const number = (text) => one.kind === 'integer' ? Math.round(text) : Number(text);
+    const number = (text) => parameter.kind === 'integer' ? Math.round(text) : Number(text);
     let input, slider = null, show = (value) => { input.value = value; };
-    if (one.kind === 'bool') {
-      input = named('input', { type: 'checkbox', className: 'all',
-        onchange: () => this.set(one.name, input.checked) });
+    if (parameter.kind === 'bool') {
+      input = labelled('input', { type: 'checkbox', className: 'all',
+        onchange: () => this.set(parameter.name, input.checked) });
       show = (value) => { input.checked = value; };
-    } else if (one.kind === 'text') {
-      input = named(...one.choices.length ? ['select', {}, ...one.choices.map((word) => new Option(word))]
+    } else if (parameter.kind === 'text') {
+      input = labelled(...parameter.choices.length ? ['select', {}, ...parameter.choices.map((word) => new Option(word))]
         : ['input', { type: 'text' }]);
       input.className = 'all';
-      input.onchange = () => this.set(one.name, input.value);
+      input.onchange = () => this.set(parameter.name, input.value);
     } else {
-      input = named('input', { type: 'number', step: 'any',
-        onchange: () => this.set(one.name, number(input.value)) });
-      if (one.low !== null && one.high !== null) slider = this.slider(one, named, number, input);
+      input = labelled('input', { type: 'number', step: 'any',
+        onchange: () => this.set(parameter.name, number(input.value)) });
+      if (parameter.low !== null && parameter.high !== null) slider = this.slider(parameter, labelled, number, input);
       else input.className = 'all';
       show = (value) => {
-        input.value = short(value);
+        input.value = rounded(value);
         if (slider && !slider.dataset.held) slider.value = value;
       };
     }
-    this.shown[one.name] = show;
-    show(one.value);
-    const label = one.name.includes('.') ? one.name.slice(one.name.indexOf('.') + 1) : one.name;
-    const range = slider ? ` (${short(one.low)} to ${short(one.high)}${one.unit && ` ${one.unit}`})` : '';
+    this.shown[parameter.name] = show;
+    show(parameter.value);
+    const label = parameter.name.includes('.') ? parameter.name.slice(parameter.name.indexOf('.') + 1) : parameter.name;
+    const range = slider ? ` (${rounded(parameter.low)} to ${rounded(parameter.high)}${parameter.unit && ` ${parameter.unit}`})` : '';
     return make('label', { className: 'parameter' },
-      make('span', { textContent: label + (one.unit ? ` [${one.unit}]` : '') }),
-      ...slider ? [slider] : [], input, make('p', { textContent: one.text + range }));
+      make('span', { textContent: label + (parameter.unit ? ` [${parameter.unit}]` : '') }),
+      ...slider ? [slider] : [], input, make('p', { textContent: parameter.text + range }));
   }
 
   // A slider beside the field of a number: while it is dragged, a value every EVERY ms.
-  slider(one, named, number, input) {
+  slider(parameter, labelled, number, input) {
     let sent = 0, timer = 0;
-    const slider = named('input', { type: 'range', min: one.low, max: one.high,
-      step: one.kind === 'integer' ? 1 : (one.high - one.low) / 2000 });
+    const slider = labelled('input', { type: 'range', min: parameter.low, max: parameter.high,
+      step: parameter.kind === 'integer' ? 1 : (parameter.high - parameter.low) / 2000 });
     const send = () => {
       clearTimeout(timer);
       sent = performance.now();
-      this.set(one.name, number(slider.value));
+      this.set(parameter.name, number(slider.value));
     };
     slider.oninput = () => {
-      input.value = short(number(slider.value));
+      input.value = rounded(number(slider.value));
       slider.dataset.held = 'yes';
       clearTimeout(timer);
-      timer = setTimeout(send, Math.max(0, EVERY - (performance.now() - sent)));
+      timer = setTimeout(send, Math.max(0, SEND_PERIOD - (performance.now() - sent)));
     };
     slider.onchange = () => {
       delete slider.dataset.held;
@@ -147,21 +147,21 @@ export class Parameters {
     return slider;
   }
 
-  take(values) {
+  update(values) {
     for (const [name, value] of Object.entries(values)) {
-      if (!this.known[name]) continue;
-      this.known[name].value = value;
+      if (!this.byName[name]) continue;
+      this.byName[name].value = value;
       this.shown[name]?.(value);
-      if (name === 'gait') this.mark(value);
+      if (name === 'gait') this.markGait(value);
     }
   }
 
   // After a refusal, every control shows the node's own value again.
   restore() {
-    for (const [name, show] of Object.entries(this.shown)) show(this.known[name].value);
+    for (const [name, show] of Object.entries(this.shown)) show(this.byName[name].value);
   }
 
-  mark(gait) {
+  markGait(gait) {
     for (const button of [...this.gaits.children, ...this.presets.children]) {
       button.classList.toggle('on', button.dataset.gait === gait);
       button.setAttribute('aria-pressed', button.dataset.gait === gait);

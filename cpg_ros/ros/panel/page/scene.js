@@ -6,28 +6,28 @@ import { BasicShadowMap, BoxGeometry, BufferAttribute, BufferGeometry, CapsuleGe
   toCreasedNormals, Vector2, Vector3, WebGLRenderer } from './three.min.js';
 
 const UP = new Vector3(0, 0, 1);
-const LEAST = 0.5;         // fraction of the screen's pixels that are drawn at least, each way
-const NEWTON = 0.0022;     // length of an arrow for each newton on a foot, m
-const HARDEST = 300;       // hardest push, N
-const REACH = 0.6;         // length of the arrow of the hardest push, m
-const CREASE = 0.7;        // edges that bend by more stay sharp, rad
-const COARSE = 0.008;      // vertices closer than this are one where software draws, m
-const HALF = 30, STRIPE = 0.006;  // half the floor and half the width of a stripe on it, m
+const MIN_RESOLUTION = 0.5;  // fraction of the screen's pixels that are drawn at least, each way
+const FORCE_SCALE = 0.0022;  // length of an arrow for each newton on a foot, m
+const MAX_PUSH = 300;  // hardest push, N
+const MAX_ARROW = 0.6;  // length of the arrow of the hardest push, m
+const CREASE_ANGLE = 0.7;  // edges that bend by more stay sharp, rad
+const COARSE_DISTANCE = 0.008;  // vertices closer than this are one where software draws, m
+const HALF_FLOOR = 30, HALF_STRIPE = 0.006;  // half the floor and half the width of a stripe on it, m
 const RADIANS = Math.PI / 180;
 // Presets of the camera: azimuth and elevation, degrees.
 const VIEWS = { quarter: [50, 18], front: [0, 10], side: [90, 8], top: [0.01, 89] };
 
 const PIXEL = new Uint8Array(4);
-const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)).buffer;
+const decodeBase64 = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)).buffer;
 
 // Close vertices become one; triangles without area go.
-function coarse(geometry) {
-  const made = mergeVertices(geometry, COARSE), { array } = made.index, whole = [];
+function coarsened(geometry) {
+  const result = mergeVertices(geometry, COARSE_DISTANCE), { array } = result.index, whole = [];
   for (let k = 0; k < array.length; k += 3) {
     const corners = array.slice(k, k + 3);
     if (new Set(corners).size === 3) whole.push(...corners);
   }
-  return made.setIndex(whole);
+  return result.setIndex(whole);
 }
 
 // Sizes are those of a geom of MuJoCo; its cylinders and capsules are along z.
@@ -37,7 +37,7 @@ const SOLIDS = { box: ([x, y, z]) => new BoxGeometry(2 * x, 2 * y, 2 * z),
   cylinder: ([r, half]) => new CylinderGeometry(r, r, 2 * half, 24).rotateX(Math.PI / 2),
   capsule: ([r, half]) => new CapsuleGeometry(r, 2 * half, 8, 24).rotateX(Math.PI / 2) };
 
-function framed(object, frame) {
+function withFrame(object, frame) {
   object.applyMatrix4(new Matrix4().fromArray(frame));
   return object;
 }
@@ -45,9 +45,9 @@ function framed(object, frame) {
 // Stripes every metre, as triangles: lines are a pixel wide, and software may leave them out.
 function grid() {
   const corners = [], geometry = new BufferGeometry();
-  for (let k = -HALF; k <= HALF; k++)
-    for (const [x0, y0, x1, y1] of [[k - STRIPE, -HALF, k + STRIPE, HALF],
-      [-HALF, k - STRIPE, HALF, k + STRIPE]])
+  for (let k = -HALF_FLOOR; k <= HALF_FLOOR; k++)
+    for (const [x0, y0, x1, y1] of [[k - HALF_STRIPE, -HALF_FLOOR, k + HALF_STRIPE, HALF_FLOOR],
+      [-HALF_FLOOR, k - HALF_STRIPE, HALF_FLOOR, k + HALF_STRIPE]])
       corners.push(x0, y0, 0, x1, y0, 0, x1, y1, 0, x0, y0, 0, x1, y1, 0, x0, y1, 0);
   geometry.setAttribute('position', new BufferAttribute(new Float32Array(corners), 3));
   geometry.computeVertexNormals();
@@ -56,12 +56,12 @@ function grid() {
 
 // An arrow along z, 1 m long.
 function arrow() {
-  const material = new MeshLambertMaterial(), made = new Group();
-  made.add(new Mesh(new CylinderGeometry(0.008, 0.008, 0.85).translate(0, 0.425, 0), material),
+  const material = new MeshLambertMaterial(), result = new Group();
+  result.add(new Mesh(new CylinderGeometry(0.008, 0.008, 0.85).translate(0, 0.425, 0), material),
     new Mesh(new CylinderGeometry(0, 0.022, 0.15).translate(0, 0.925, 0), material));
-  made.children.forEach((one) => one.geometry.rotateX(Math.PI / 2));
-  made.tint = material.color;
-  return made;
+  result.children.forEach((one) => one.geometry.rotateX(Math.PI / 2));
+  result.tint = material.color;
+  return result;
 }
 
 export class Scene {
@@ -89,7 +89,7 @@ export class Scene {
     this.build();
     this.look(azimuth, elevation, distance);
     this.controls.addEventListener('change', moved);
-    this.listen();
+    this.addListeners();
   }
 
   build() {
@@ -101,31 +101,31 @@ export class Scene {
     this.sun.shadow.radius = 5;
     this.sun.shadow.normalBias = 0.01;
     Object.assign(this.sun.shadow.camera, { left: -1.2, right: 1.2, top: 1.2, bottom: -1.2, far: 8 });
-    this.floor = new Mesh(new PlaneGeometry(2 * HALF, 2 * HALF), new MeshLambertMaterial({
+    this.floor = new Mesh(new PlaneGeometry(2 * HALF_FLOOR, 2 * HALF_FLOOR), new MeshLambertMaterial({
       polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 4 }));  // below its grid
     this.floor.receiveShadow = true;
     this.grid = grid();
     this.grid.receiveShadow = true;
-    this.aim = arrow();
-    this.aim.visible = false;
+    this.pushArrow = arrow();
+    this.pushArrow.visible = false;
     this.world.add(new HemisphereLight(0xffffff, 0x8899aa, 1.6), this.sun, this.sun.target,
-      this.floor, this.grid, this.robot, this.aim);
-    this.paint();
+      this.floor, this.grid, this.robot, this.pushArrow);
+    this.setColours();
   }
 
   // Colours of the page's theme.
-  paint() {
+  setColours() {
     if (!this.renderer) return;
     const style = getComputedStyle(document.documentElement);
     const colour = (name) => new Color(style.getPropertyValue(name).trim());
     this.world.background = this.world.fog.color = colour('--sky');
     this.floor.material.color = colour('--floor');
     this.grid.material.color = colour('--floor-line');
-    this.good = colour('--good');
-    this.aim.tint.copy(colour('--b'));
+    this.forceColour = colour('--good');
+    this.pushArrow.tint.copy(colour('--b'));
   }
 
-  // Turn the camera around its target; a distance of 0 keeps that.
+  // Turn the camera around its target; a distance of 0 leaves the distance as it is.
   look(azimuth, elevation, distance = 0) {
     const away = distance || this.camera.position.distanceTo(this.controls.target);
     const [a, e] = [azimuth * RADIANS, elevation * RADIANS];
@@ -157,7 +157,7 @@ export class Scene {
     this.robot.clear();
     Object.assign(this, { shape, links: [], arrows: {} });
     for (const link of shape.links) {
-      const group = framed(new Group(), link.frame);
+      const group = withFrame(new Group(), link.frame);
       group.userData = { rest: group.quaternion.clone(), place: group.position.clone(),
         axis: new Vector3(...link.axis) };
       for (const part of link.parts) group.add(this.part(part));
@@ -169,20 +169,20 @@ export class Scene {
   part({ kind, size, colour, frame, low, step, points, triangles }) {
     let geometry = SOLIDS[kind]?.(size);
     if (!geometry) {
-      const corners = Float32Array.from(new Uint16Array(bytes(points)),
+      const corners = Float32Array.from(new Uint16Array(decodeBase64(points)),
         (n, k) => low[k % 3] + step * n);
       geometry = new BufferGeometry();
       geometry.setAttribute('position', new BufferAttribute(corners, 3));
-      geometry.setIndex(new BufferAttribute(new Uint32Array(bytes(triangles)), 1));
+      geometry.setIndex(new BufferAttribute(new Uint32Array(decodeBase64(triangles)), 1));
       // With sharp edges no vertex is shared: three times as many, for a graphics card.
-      geometry = this.software ? coarse(geometry) : toCreasedNormals(geometry, CREASE);
+      geometry = this.software ? coarsened(geometry) : toCreasedNormals(geometry, CREASE_ANGLE);
     }
     // The sides of a thin wall are one when merged: their normals would cancel.
     const shade = { side: DoubleSide, flatShading: this.software,
       color: new Color().setRGB(...colour, SRGBColorSpace) };
     const material = this.software ? new MeshLambertMaterial(shade)
       : new MeshStandardMaterial({ roughness: 0.55, metalness: 0.1, ...shade });
-    const mesh = framed(new Mesh(geometry, material), frame);
+    const mesh = withFrame(new Mesh(geometry, material), frame);
     mesh.castShadow = true;
     mesh.receiveShadow = !this.software;  // flat triangles would shade themselves in stripes
     return mesh;
@@ -226,11 +226,11 @@ export class Scene {
     this.follow();
     for (const leg of Object.keys(this.shape?.feet || {})) {
       if (!this.arrows[leg]) this.world.add(this.arrows[leg] = arrow());
-      const made = this.arrows[leg];
-      made.visible = forces[leg] > 1;
-      made.position.copy(this.foot(leg));
-      made.scale.z = NEWTON * (forces[leg] || 1);
-      made.tint.copy(this.good);
+      const force = this.arrows[leg];
+      force.visible = forces[leg] > 1;
+      force.position.copy(this.foot(leg));
+      force.scale.z = FORCE_SCALE * (forces[leg] || 1);
+      force.tint.copy(this.forceColour);
     }
     renderer.render(this.world, camera);
     // Software draws later, unless what it has drawn is asked for: what that takes would go unseen.
@@ -240,10 +240,10 @@ export class Scene {
   // The camera goes along with the robot, smoothly, and jumps with it.
   follow() {
     const now = performance.now(), { x, y } = this.robot.position, { target } = this.controls;
-    const from = this.followed ||= new Vector3(target.x, target.y, 0);
+    const from = this.followedPoint ||= new Vector3(target.x, target.y, 0);
     const way = new Vector3(x - from.x, y - from.y, 0);
-    way.multiplyScalar(way.length() > 1 ? 1 : 1 - Math.exp(((this.drawn || 0) - now) / 150));
-    this.drawn = now;
+    way.multiplyScalar(way.length() > 1 ? 1 : 1 - Math.exp(((this.lastDraw || 0) - now) / 150));
+    this.lastDraw = now;
     for (const moved of [from, target, this.camera.position]) moved.add(way);
     this.sun.target.position.set(x, y, 0);
     this.sun.position.set(x + 1.2, y + 0.9, 3.5);
@@ -253,26 +253,26 @@ export class Scene {
 
   // Fewer pixels where drawing them holds up the browser, as without a graphics card. Called at each
   // of its beats, also when there is nothing to draw: a robot that moves slowly is drawn as sharply.
-  beat(now) {
-    const passed = now - (this.before ?? now);
-    this.before = now;
-    if (passed > 0 && passed < 1000) this.pace = 0.8 * (this.pace ?? 33) + 0.2 * passed;
-    if (this.pace > 70) this.resolution = Math.max(LEAST, 0.9 * this.resolution);
-    else if (this.pace < 40) this.resolution = Math.min(1, 1.01 * this.resolution);
+  adaptResolution(now) {
+    const passed = now - (this.lastFrame ?? now);
+    this.lastFrame = now;
+    if (passed > 0 && passed < 1000) this.framePeriod = 0.8 * (this.framePeriod ?? 33) + 0.2 * passed;
+    if (this.framePeriod > 70) this.resolution = Math.max(MIN_RESOLUTION, 0.9 * this.resolution);
+    else if (this.framePeriod < 40) this.resolution = Math.min(1, 1.01 * this.resolution);
   }
 
   // The arrow of a push, N and degrees from the world's x to its y; none without a force.
-  point(force, direction) {
+  showPush(force, direction) {
     if (!this.renderer) return;
-    this.aim.visible = force > 0;
-    this.aim.position.copy(this.robot.position);
-    this.aim.quaternion.setFromUnitVectors(
+    this.pushArrow.visible = force > 0;
+    this.pushArrow.position.copy(this.robot.position);
+    this.pushArrow.quaternion.setFromUnitVectors(
       UP, new Vector3(Math.cos(direction * RADIANS), Math.sin(direction * RADIANS), 0));
-    this.aim.scale.z = 0.15 + REACH * force / HARDEST;
+    this.pushArrow.scale.z = 0.15 + MAX_ARROW * force / MAX_PUSH;
   }
 
   // Shift and a drag on the robot push it, by the way that the pointer goes on the level.
-  listen() {
+  addListeners() {
     const { canvas, controls, camera } = this, ray = new Raycaster();
     const at = (event) => {
       const box = canvas.getBoundingClientRect();
@@ -292,15 +292,15 @@ export class Scene {
       const to = level && at(event).ray.intersectPlane(level, new Vector3());
       if (!to) return;
       to.sub(from);
-      way = [Math.min(HARDEST, HARDEST * to.length() / REACH), Math.atan2(to.y, to.x) / RADIANS];
-      this.point(...way);
+      way = [Math.min(MAX_PUSH, MAX_PUSH * to.length() / MAX_ARROW), Math.atan2(to.y, to.x) / RADIANS];
+      this.showPush(...way);
     });
     for (const kind of ['pointerup', 'pointercancel'])
       canvas.addEventListener(kind, () => {
         if (!level) return;
         level = null;
         controls.enabled = true;
-        this.point(0, 0);
+        this.showPush(0, 0);
         if (way && kind === 'pointerup') this.push(...way);
       });
   }

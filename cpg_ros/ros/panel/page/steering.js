@@ -1,6 +1,6 @@
 // The pad and the arrow keys: the robot is steered only while one of them is held.
 
-const REACH = 3.5;  // rem from the middle of the pad to the outermost place of the knob
+const KNOB_RANGE = 3.5;  // rem from the middle of the pad to the outermost place of the knob
 
 export class Steering {
   // What is held goes to the link, which repeats it: [speed, turn], or null.
@@ -12,7 +12,7 @@ export class Steering {
     this.able = false;
     this.held = null;
     this.released = () => {};
-    this.listen();
+    this.addListeners();
   }
 
   enable(able) {
@@ -26,7 +26,7 @@ export class Steering {
     this.held = [speed, turn];
     this.pad.classList.add('held');
     // Both at full reach are in a corner: the knob stays in its circle.
-    const reach = REACH / Math.max(1, Math.hypot(speed, turn));
+    const reach = KNOB_RANGE / Math.max(1, Math.hypot(speed, turn));
     this.knob.style.transform = `translate(${-reach * turn}rem, ${-reach * speed}rem)`;
     this.send(this.held);
   }
@@ -41,7 +41,7 @@ export class Steering {
     this.released();
   }
 
-  listen() {
+  addListeners() {
     const { pad } = this, clip = (value) => Math.max(-1, Math.min(1, +value.toFixed(3)));
     const follow = (event) => {
       const box = pad.getBoundingClientRect(), reach = 0.4 * box.width;
@@ -67,8 +67,8 @@ export class Steering {
   key(name, down) {
     if (down) this.keys.add(name);
     else this.keys.delete(name);
-    const is = (key) => this.keys.has(key) ? 1 : 0;
-    const speed = is('ArrowUp') - is('ArrowDown'), turn = is('ArrowLeft') - is('ArrowRight');
+    const pressed = (key) => this.keys.has(key) ? 1 : 0;
+    const speed = pressed('ArrowUp') - pressed('ArrowDown'), turn = pressed('ArrowLeft') - pressed('ArrowRight');
     if (speed || turn) this.hold(speed, turn);
     else this.release();
   }
