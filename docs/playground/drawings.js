@@ -48,15 +48,15 @@ function drawPortrait(colours, soft) {
   const [xs, ys] = [traces.cells[0], traces.rates];
   const [left, right] = [Math.min(...xs), Math.max(...xs)];
   const [low, high] = [Math.min(...ys), Math.max(...ys)];
-  const place = (k) => [10 + (width - 20) * (xs[k] - left) / (right - left || 1),
+  const toPixels = (k) => [10 + (width - 20) * (xs[k] - left) / (right - left || 1),
                         height - 10 - (height - 32) * (ys[k] - low) / (high - low || 1)];
-  line(context, xs.map((_, k) => place(k)), colours[0]);
+  line(context, xs.map((_, k) => toPixels(k)), colours[0]);
   context.fillStyle = soft;
   const {states} = simulation.network;
   context.fillText(`cell 1: ${states[0]} across, ${states[1] || `d${states[0]}/dt`} up`, 6, 14);
   if (xs.length) {
     context.beginPath();
-    context.arc(...place(xs.length - 1), 4, 0, 7);
+    context.arc(...toPixels(xs.length - 1), 4, 0, 7);
     context.fillStyle = colours[1];
     context.fill();
   }
@@ -97,7 +97,7 @@ function drawRobot(colours, soft, ink) {
     return [mid + (offset + (far ? 0.02 : 0)) * scale, body, far];
   };
   context.strokeStyle = soft;
-  const shift = (walker.way * scale) % 40;
+  const shift = (walker.distance * scale) % 40;
   line(context, [[0, ground], [width, ground]], soft, 1);
   for (let x = -shift - 40; x < width + 40; x += 40) {
     line(context, [[x, ground], [x - 8, ground + 8]], soft, 1);
@@ -116,7 +116,7 @@ function drawRobot(colours, soft, ink) {
   }
   context.fillStyle = soft;
   context.fillText(walker.hipless ? 'in place: the robot file has no hips'
-    : `${walker.way.toFixed(2)} m with links of ${UPPER} m`, 6, 14);
+    : `${walker.distance.toFixed(2)} m with links of ${UPPER} m`, 6, 14);
 }
 
 function nameCells() {

@@ -6,7 +6,8 @@
 
 const $ = (id) => document.getElementById(id);
 const state = {network: '', gait: '', speed: 1, paused: false, moved: '', changed: {}};
-let simulation, walker, traces, owed = 0, last = 0, frames = [], runs = 0, judged = 0, work = 0;
+let simulation, walker, traces;
+let pendingTime = 0, last = 0, frames = [], searchCount = 0, verdictTime = 0, drawingTime = 0;
 const COLOURS = ['--a', '--b', '--c', '--d'];
 // Read when the theme changes, not in each frame.
 let theme = {};
@@ -27,20 +28,20 @@ function start() {
   walker = new Walker(network, gait);
   for (const [name, value] of Object.entries(state.changed)) { simulation.set(name, value); }
   traces = {times: [], cells: Array.from({length: network.cells}, () => []), rates: [], feet: []};
-  owed = 0;
-  $('found').textContent = '';
+  pendingTime = 0;
+  $('threshold-result').textContent = '';
   document.documentElement.dataset.ready = 'yes';
 }
 
 function advance(seconds) {
   const {gait} = simulation;
-  owed += Math.min(seconds, 0.1) * state.speed * gait.period;
-  const every = Math.max(1, Math.round(gait.period / simulation.h / 160));
-  while (owed >= simulation.h) {
+  pendingTime += Math.min(seconds, 0.1) * state.speed * gait.period;
+  const sampleInterval = Math.max(1, Math.round(gait.period / simulation.h / 160));
+  while (pendingTime >= simulation.h) {
     simulation.step();
-    walker.watch(simulation);
-    owed -= simulation.h;
-    if (Math.round(simulation.time / simulation.h) % every) { continue; }
+    walker.observe(simulation);
+    pendingTime -= simulation.h;
+    if (Math.round(simulation.time / simulation.h) % sampleInterval) { continue; }
     traces.times.push(simulation.time);
     traces.cells.forEach((trace, cell) => trace.push(simulation.value(cell)));
     traces.rates.push(simulation.network.states.length > 1
@@ -56,36 +57,36 @@ function advance(seconds) {
 function verdict() {
   const {gait} = simulation;
   const nominal = gait.range[gait.waves[0]];
-  const strides = walker.rises[0].length - 1;
-  const share = walker.swing[0] / nominal;
-  const since = simulation.time - (walker.rises[0].at(-1) || 0);
+  const strides = walker.crossings[0].length - 1;
+  const ratio = walker.swing[0] / nominal;
+  const since = simulation.time - (walker.crossings[0].at(-1) || 0);
   const period = walker.period();
   let [text, kind] = ['', ''];
   if (![0, 1].every((i) => Number.isFinite(simulation.value(i)))) {
     [text, kind] = ['no gait here: the state grew beyond all numbers', 'bad'];
-  } else if (share < 0.02 || (share < 0.2 && since > 3 * gait.period)) {
-    text = `no gait here: cell 1 swings by ${short(100 * share)} % of what it does in the preset `
+  } else if (ratio < 0.02 || (ratio < 0.2 && since > 3 * gait.period)) {
+    text = `no gait here: cell 1 swings by ${short(100 * ratio)} % of what it does in the preset `
       + '(looked at: its last one and a half strides)';
     kind = 'bad';
   } else if (strides < 3) {
     text = 'running in: fewer than three strides';
   } else if (Math.abs(walker.change) > 0.02) {
-    text = `settling: cell 1 swings by ${Math.round(100 * share)} % of what it does in the preset, `
+    text = `settling: cell 1 swings by ${Math.round(100 * ratio)} % of what it does in the preset, `
       + `${short(100 * walker.change)} % more than one and a half strides before`;
   } else {
     const legs = walker.legs(simulation.time);
-    const off = Math.max(...legs.map((phase, n) => {
-      const apart = Math.abs(phase - (((gait.legs[n] - gait.legs[0]) % 1) + 1) % 1) % 1;
-      return Math.min(apart, 1 - apart);
+    const phaseError = Math.max(...legs.map((phase, n) => {
+      const difference = Math.abs(phase - (((gait.legs[n] - gait.legs[0]) % 1) + 1) % 1) % 1;
+      return Math.min(difference, 1 - difference);
     }));
-    const steady = Math.abs(walker.rises[0].at(-2) - walker.rises[0].at(-3) - period) / period;
+    const steady = Math.abs(walker.crossings[0].at(-2) - walker.crossings[0].at(-3) - period) / period;
     const names = Object.keys(simulation.network.legs);
-    text = `${off < 0.05 ? state.gait : `not ${state.gait}`}: period ${short(period)}, legs `
+    text = `${phaseError < 0.05 ? state.gait : `not ${state.gait}`}: period ${short(period)}, legs `
       + `${names.map((leg, n) => `${leg} ${legs[n].toFixed(2)}`).join(', ')}; swing `
-      + `${Math.round(100 * share)} % of the preset's, the last two strides differ by `
+      + `${Math.round(100 * ratio)} % of the preset's, the last two strides differ by `
       + `${Number((100 * steady).toPrecision(2))} % (looked at: ${strides} strides`
       + `${gait.gain ? ", within the gait's symmetry" : ''})`;
-    kind = off < 0.05 ? 'good' : 'bad';
+    kind = phaseError < 0.05 ? 'good' : 'bad';
   }
   $('verdict').textContent = text;
   $('verdict').className = kind;
@@ -96,46 +97,46 @@ function threshold() {
   const name = state.moved;
   const range = simulation.network.ranges[name];
   const origin = simulation.clone();
-  const here = origin.values[name];
-  const [low, high] = span(name);
-  const mine = ++runs;
+  const current = origin.values[name];
+  const [low, high] = sliderRange(name);
+  const search = ++searchCount;
   const strides = 40;
-  const ends = [low, high].map((end) => ({end, alive: here, dead: null, left: 14}));
+  const ends = [low, high].map((end) => ({end, present: current, absent: null, bisections: 14}));
   const report = () => {
-    const lines = ends.map((one) => (one.dead === null ? `up to ${short(one.alive)} it runs on`
-      : `it ends between ${short(one.alive)} and ${short(one.dead)}`));
-    $('found').textContent = `${name} from ${short(low)} to ${short(high)}: ${lines.join('; ')}. `
+    const lines = ends.map((one) => (one.absent === null ? `up to ${short(one.present)} it runs on`
+      : `it ends between ${short(one.present)} and ${short(one.absent)}`));
+    $('threshold-result').textContent = `${name} from ${short(low)} to ${short(high)}: ${lines.join('; ')}. `
       + `Looked at: ${strides} strides a run from the present state`
       + `${origin.gait.gain ? ", within the gait's symmetry" : ''}; it ends at a Hopf point or a `
       + 'fold of orbits.';
-    $('found').dataset.ends = JSON.stringify(ends);
+    $('threshold-result').dataset.ends = JSON.stringify(ends);
   };
   const next = () => {
-    const one = ends.find((end) => end.left > 0);
-    if (mine !== runs || !one) {
-      if (mine === runs) { $('found').dataset.done = 'yes'; }
+    const one = ends.find((end) => end.bisections > 0);
+    if (search !== searchCount || !one) {
+      if (search === searchCount) { $('threshold-result').dataset.done = 'yes'; }
       return;
     }
-    const value = one.dead === null ? one.end : 0.5 * (one.alive + one.dead);
-    if (value === here) {
-      one.left = 0;
+    const value = one.absent === null ? one.end : 0.5 * (one.present + one.absent);
+    if (value === current) {
+      one.bisections = 0;
     } else if (persists(origin, name, value, strides)) {
-      one.alive = value;
-      one.left = one.dead === null ? 0 : one.left - 1;
+      one.present = value;
+      one.bisections = one.absent === null ? 0 : one.bisections - 1;
     } else {
-      one.dead = value;
-      one.left--;
+      one.absent = value;
+      one.bisections--;
     }
     report();
     setTimeout(next, 0);
   };
-  delete $('found').dataset.done;
+  delete $('threshold-result').dataset.done;
   if (range) { next(); }
 }
 
 // -- controls and link ---------------------------------------------------------------------------
 
-function span(name) {
+function sliderRange(name) {
   const [low, high] = simulation.network.ranges[name];
   const value = simulation.gait.values[name];
   const half = Math.max(1.5 * Math.abs(value), 0.02 * (high - low));
@@ -146,7 +147,7 @@ function controls() {
   const box = $('parameters');
   box.replaceChildren();
   for (const [name, [low, high, text]] of Object.entries(simulation.network.ranges)) {
-    const [from, to] = span(name);
+    const [from, to] = sliderRange(name);
     const row = document.createElement('label');
     row.className = 'parameter';
     const slider = Object.assign(document.createElement('input'), {
@@ -161,7 +162,7 @@ function controls() {
       state.changed[name] = value;
       state.moved = name;
       $('last').textContent = name;
-      runs++;
+      searchCount++;
       save();
     };
     slider.oninput = () => { change(Number(slider.value)); field.value = short(Number(slider.value)); };
@@ -176,28 +177,28 @@ function controls() {
   $('last').textContent = state.moved;
 }
 
-function options(select, names, chosen) {
-  select.replaceChildren(...names.map((name) => new Option(name, name, false, name === chosen)));
+function options(select, names, selected) {
+  select.replaceChildren(...names.map((name) => new Option(name, name, false, name === selected)));
 }
 
 function save() {
-  const words = new URLSearchParams({network: state.network, gait: state.gait, speed: state.speed});
-  for (const [name, value] of Object.entries(state.changed)) { words.set(`p.${name}`, value); }
-  history.replaceState(null, '', `#${words}`);
+  const query = new URLSearchParams({network: state.network, gait: state.gait, speed: state.speed});
+  for (const [name, value] of Object.entries(state.changed)) { query.set(`p.${name}`, value); }
+  history.replaceState(null, '', `#${query}`);
 }
 
 // Whatever of a link is not known is left out.
 function load() {
-  const words = new URLSearchParams(location.hash.slice(1));
-  state.network = NETWORKS[words.get('network')] ? words.get('network') : Object.keys(NETWORKS)[0];
+  const query = new URLSearchParams(location.hash.slice(1));
+  state.network = NETWORKS[query.get('network')] ? query.get('network') : Object.keys(NETWORKS)[0];
   const network = NETWORKS[state.network];
-  state.gait = network.gaits[words.get('gait')] ? words.get('gait') : network.usual;
+  state.gait = network.gaits[query.get('gait')] ? query.get('gait') : network.usual;
   if (!network.gaits[state.gait]) { state.gait = Object.keys(network.gaits)[0]; }
-  const speed = Number(words.get('speed'));
+  const speed = Number(query.get('speed'));
   state.speed = speed > 0 && speed <= 3 ? speed : 1;
   state.changed = {};
   for (const [name, [low, high]] of Object.entries(network.ranges)) {
-    const value = words.has(`p.${name}`) ? Number(words.get(`p.${name}`)) : NaN;
+    const value = query.has(`p.${name}`) ? Number(query.get(`p.${name}`)) : NaN;
     if (value >= low && value <= high) { state.changed[name] = value; }
   }
   show();
@@ -243,18 +244,18 @@ function frame(now) {
   last = now;
   if (!state.paused) { advance(seconds); }
   if (traces.times.length > 1) { draw(); }
-  if (now - judged > 250) {
-    judged = now;
+  if (now - verdictTime > 250) {
+    verdictTime = now;
     verdict();
   }
-  work = 0.95 * work + 0.05 * (performance.now() - began);
+  drawingTime = 0.95 * drawingTime + 0.05 * (performance.now() - began);
   frames.push(now);
   while (frames.length > 120) { frames.shift(); }
   if (frames.length > 30) {
     const rate = 1000 * (frames.length - 1) / (now - frames[0]);
-    if (judged === now) { $('rate').textContent = `${rate.toFixed(0)} frames a second`; }
+    if (verdictTime === now) { $('rate').textContent = `${rate.toFixed(0)} frames a second`; }
     document.documentElement.dataset.rate = rate;
-    document.documentElement.dataset.work = work.toFixed(2);
+    document.documentElement.dataset.work = drawingTime.toFixed(2);
   }
   requestAnimationFrame(frame);
 }

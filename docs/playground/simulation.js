@@ -97,7 +97,7 @@ class Simulation {
     }
   }
 
-  hear(c) {
+  updateDrive(c) {
     if (this.equations.drive) {
       this.pastState(this.delay - c, this.past);
       this.equations.drive(this.past, this.p, this.driven);
@@ -135,7 +135,7 @@ class Simulation {
       this.before.set(this.slope.subarray(at, at + this.size));
       this.kink = this.head;
     }
-    this.hear(0);
+    this.updateDrive(0);
     this.rates(this.x, at, 0, this.before, 0, this.slope, at);
   }
 
@@ -144,10 +144,10 @@ class Simulation {
     const now = this.head * size;
     const next = (this.head + 1) % this.nodes;
     const to = next * size;
-    this.hear(0.5);
+    this.updateDrive(0.5);
     this.rates(x, now, 0.5 * h, slope, now, k2, 0);
     this.rates(x, now, 0.5 * h, k2, 0, k3, 0);
-    this.hear(1);
+    this.updateDrive(1);
     this.rates(x, now, h, k3, 0, k4, 0);
     for (let i = 0; i < size; i++) {
       const value = h / 6 * (slope[now + i] + 2 * (k2[i] + k3[i]) + k4[i]) - carry[i];
@@ -194,8 +194,8 @@ class Simulation {
 function measurePeriod(simulation, strides) {
   const times = [];
   const level = simulation.gait.levels[simulation.gait.waves[0]];
-  const most = 4 * strides * simulation.gait.period / simulation.h;
-  for (let n = 0; n < most && times.length <= 2 * strides; n++) {
+  const maxSteps = 4 * strides * simulation.gait.period / simulation.h;
+  for (let n = 0; n < maxSteps && times.length <= 2 * strides; n++) {
     simulation.step();
     const time = simulation.crossing(0, level);
     if (time === time) {
@@ -211,7 +211,7 @@ function persists(simulation, name, value, strides) {
   run.set(name, value);
   const nominal = Math.max(...run.gait.range);
   const steps = Math.round(strides * run.gait.period / run.h);
-  const found = [];
+  const swings = [];
   for (let part = 0; part < 4; part++) {
     let [low, high] = [Infinity, -Infinity];
     for (let n = 0; n < steps / 4; n++) {
@@ -219,10 +219,10 @@ function persists(simulation, name, value, strides) {
       low = Math.min(low, run.value(0));
       high = Math.max(high, run.value(0));
     }
-    found.push(high - low);
-    if (!(found[part] > 0.02 * nominal) || !Number.isFinite(found[part])) {
+    swings.push(high - low);
+    if (!(swings[part] > 0.02 * nominal) || !Number.isFinite(swings[part])) {
       return false;
     }
   }
-  return found[3] > 0.5 * nominal || found[3] > 0.93 * found[2];
+  return swings[3] > 0.5 * nominal || swings[3] > 0.93 * swings[2];
 }

@@ -10,24 +10,24 @@ const CONTACT = 0.015;  // a foot this close to the lowest one is on the ground,
 
 class Walker {
   constructor(network, gait) {
-    Object.assign(this, {network, gait, way: 0, feet: {}, stance: {}});
+    Object.assign(this, {network, gait, distance: 0, feet: {}, stance: {}});
     this.hipless = !network.robot.some((joint) => /hip|thigh|coxa|femur|tarsal/.test(joint.name));
-    this.rises = Array.from({length: network.cells}, () => []);
+    this.crossings = Array.from({length: network.cells}, () => []);
     this.low = new Float64Array(network.cells).fill(Infinity);
     this.high = new Float64Array(network.cells).fill(-Infinity);
     this.swing = gait.waves.map((wave) => gait.range[wave]);
     this.middle = gait.waves.map((wave) => gait.levels[wave]);
-    this.since = this.change = 0;
+    this.timeSince = this.change = 0;
   }
 
   // To be called after each step.
-  watch(simulation) {
+  observe(simulation) {
     for (let cell = 0; cell < this.network.cells; cell++) {
       const value = simulation.value(cell);
       this.low[cell] = Math.min(this.low[cell], value);
       this.high[cell] = Math.max(this.high[cell], value);
       const time = simulation.crossing(cell, this.middle[cell]);
-      const last = this.rises[cell];
+      const last = this.crossings[cell];
       const far = last.length > 1 ? 0.6 * (last.at(-1) - last.at(-2)) : 0.2 * this.gait.period;
       if (time === time && (!last.length || time - last.at(-1) > far)) {
         last.push(time);
@@ -35,8 +35,8 @@ class Walker {
       }
     }
     // Swings and their middles are of the last one and a half strides or so.
-    this.since += simulation.h;
-    if (this.since > 1.5 * (this.period() || this.gait.period)) {
+    this.timeSince += simulation.h;
+    if (this.timeSince > 1.5 * (this.period() || this.gait.period)) {
       this.change = (this.high[0] - this.low[0]) / this.swing[0] - 1;
       for (let cell = 0; cell < this.network.cells; cell++) {
         this.swing[cell] = this.high[cell] - this.low[cell];
@@ -44,17 +44,17 @@ class Walker {
         this.low[cell] = Infinity;
         this.high[cell] = -Infinity;
       }
-      this.since = 0;
+      this.timeSince = 0;
     }
   }
 
   period() {
-    const last = this.rises[0];
+    const last = this.crossings[0];
     return last.length > 1 ? last.at(-1) - last.at(-2) : NaN;
   }
 
   phase(cell, time) {
-    const last = this.rises[cell];
+    const last = this.crossings[cell];
     if (!last.length) { return this.gait.phases[cell] + time / this.gait.period; }
     const own = last.length > 1 ? last.at(-1) - last.at(-2) : this.gait.period;
     return this.gait.rising[this.gait.waves[cell]] + Math.min(1, (time - last.at(-1)) / own);
@@ -64,9 +64,9 @@ class Walker {
   legs(time) {
     const {network, gait} = this;
     const names = Object.keys(network.legs);
-    const found = names.map((leg, n) => this.phase(network.legs[leg], time)
+    const phases = names.map((leg, n) => this.phase(network.legs[leg], time)
       - gait.phases[network.legs[leg]] + gait.legs[n]);
-    return found.map((phase) => (((phase - found[0]) % 1) + 1) % 1);
+    return phases.map((phase) => (((phase - phases[0]) % 1) + 1) % 1);
   }
 
   angles(time) {
@@ -77,8 +77,8 @@ class Walker {
       const low = Math.floor(place) % table.length;
       const value = table[low] + (place - Math.floor(place))
         * (table[(low + 1) % table.length] - table[low]);
-      const share = this.swing[joint.cell] / gait.range[gait.waves[joint.cell]];
-      return gait.stand[n] + value * Math.min(1.2, share || 0);
+      const ratio = this.swing[joint.cell] / gait.range[gait.waves[joint.cell]];
+      return gait.stand[n] + value * Math.min(1.2, ratio || 0);
     });
   }
 
@@ -109,18 +109,18 @@ class Walker {
       });
     }
     const lowest = Math.min(...Object.values(points).map((line) => line.at(-1)[1]));
-    let [moved, count] = [0, 0];
+    let [motion, count] = [0, 0];
     for (const [leg, line] of Object.entries(points)) {
       const [x, z] = line.at(-1);
-      const stands = z < lowest + CONTACT;
-      if (stands && this.stance[leg]) {
-        moved -= x - this.feet[leg];
+      const inStance = z < lowest + CONTACT;
+      if (inStance && this.stance[leg]) {
+        motion -= x - this.feet[leg];
         count++;
       }
       this.feet[leg] = x;
-      this.stance[leg] = stands;
+      this.stance[leg] = inStance;
     }
-    this.way += count ? moved / count : 0;
+    this.distance += count ? motion / count : 0;
     return {points, lowest};
   }
 }

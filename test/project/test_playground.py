@@ -101,7 +101,7 @@ def test_it_walks_and_says_where_there_is_no_gait(open_page):
     page = open_page('network=delayed&gait=trot&speed=3')
     page.wait_for_function("document.getElementById('verdict').className === 'good'")
     assert 'lh 0.00, rh 0.50, lf 0.50, rf 0.00' in page.inner_text('#verdict')
-    page.wait_for_function('walker.way > 0.5')
+    page.wait_for_function('walker.distance > 0.5')
     assert float(page.evaluate('document.documentElement.dataset.work')) > 0.0
     page.fill('.parameter:first-child input[type=number]', '-9')
     page.keyboard.press('Tab')
@@ -114,13 +114,14 @@ def test_a_threshold_is_where_the_hopf_point_is(open_page):
     page = open_page('network=delayed&gait=trot')
     page.evaluate("state.moved = 'c'")
     page.click('#threshold')
-    page.wait_for_function("document.getElementById('found').dataset.done", timeout=120_000)
-    low, high = json.loads(page.get_attribute('#found', 'data-ends'))
+    page.wait_for_function("document.getElementById('threshold-result').dataset.done",
+                           timeout=120_000)
+    low, high = json.loads(page.get_attribute('#threshold-result', 'data-ends'))
     network = find_network('delayed').presets()['trot'].network
     wanted = [one.value for one in hopf_points(network, 'c', 4.0, 6.0) if 'trot' in repr(one)]
-    assert [low['alive'], low['dead']] == pytest.approx(wanted * 2, rel=0.02)
-    assert low['dead'] < low['alive'] and high['dead'] is None
-    assert '40 strides a run' in page.inner_text('#found')
+    assert [low['present'], low['absent']] == pytest.approx(wanted * 2, rel=0.02)
+    assert low['absent'] < low['present'] and high['absent'] is None
+    assert '40 strides a run' in page.inner_text('#threshold-result')
 
 
 def test_a_link_holds_the_state(open_page):
