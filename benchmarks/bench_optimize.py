@@ -31,7 +31,7 @@ from cpg_ros.analysis.nsga2 import optimise
 from cpg_ros.analysis.objectives import search_space
 from cpg_ros.dynamics.integration.simulate import Trajectory
 from cpg_ros.dynamics.settling import last_cycle, population_run, SPAN, start_states, STEP_RATIO
-from cpg_ros.networks.library.biped import Biped, CELL, CELLS, PARTNERS, PRIMARY
+from cpg_ros.networks.library.biped import Biped, CELLS, PARTNERS, PRIMARY
 from numba import njit
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -39,8 +39,9 @@ from scipy.integrate import solve_ivp
 GAIT, SETS, ROUNDS = 'walk', 16, 3
 TARGETS = {'speedup_per_network': 20.0, 'search_s': 60.0}
 PLACES = np.array(list(PARTNERS.values()))
-G_CA, V_CA, G_K, V_K, G_L, V_L = (CELL.g_ca, CELL.v_ca, CELL.g_k, CELL.v_k, CELL.g_l, CELL.v_l)
-V1, V2, V3, V4 = CELL.v1, CELL.v2, CELL.v3, CELL.v4
+G_CA, V_CA, G_K, V_K, G_L, V_L, V1, V2, V3, V4 = (
+    Biped.constants[name][0]
+    for name in ('g_ca', 'v_ca', 'g_k', 'v_k', 'g_l', 'v_l', 'v1', 'v2', 'v3', 'v4'))
 
 
 @njit

@@ -18,6 +18,7 @@ FitzHugh-Nagumo and Wilson-Cowan cells, relaxation oscillators, unlike cells, an
 One of Hodgkin-Huxley cells stands in the tutorial about networks of one's own.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
@@ -268,7 +269,7 @@ def tutorial_file(folder: str, name: str) -> str:
 
 
 @cache
-def half_centre() -> type[Network]:
+def half_centre() -> Callable[..., Network]:
     """Return the tutorial's network of Hodgkin-Huxley cells."""
     with tempfile.TemporaryDirectory() as folder:
         return find_network(tutorial_file(folder, 'half_centre.py'))

@@ -23,6 +23,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from typing import Self
 
 from common import log, ROOT
 from cpg_ros.ros.node.node_base import leave_shared_memory
@@ -73,7 +74,7 @@ class Process:
                                        preexec_fn=ends_with_us)
         self.pid = self._child.pid
 
-    def __enter__(self) -> 'Process':
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -14,7 +14,11 @@
 
 """The linters of ROS 2, where they are installed, and what they ask for that ruff does not."""
 
+import os
 from pathlib import Path
+import re
+import subprocess
+import sys
 
 import pytest
 
@@ -43,3 +47,19 @@ def test_every_source_file_begins_with_copyright_and_licence():
                if file.read_text() and not file.read_text().removeprefix(
                    '#!/usr/bin/env python3\n').startswith(head)]
     assert not lacking
+
+
+def test_benchmarks_call_the_package_as_it_is(tmp_path):
+    """They run for minutes each: mypy finds the names and arguments that are no longer there."""
+    pytest.importorskip('mypy', reason='mypy is not installed')
+    folder = ROOT / 'benchmarks'
+    ran = subprocess.run(
+        [sys.executable, '-m', 'mypy', '--config-file', os.devnull, '--cache-dir', tmp_path,
+         '--ignore-missing-imports', '--check-untyped-defs', '--explicit-package-bases',
+         *folder.glob('*.py'), *(folder / 'leaderboard').glob('*.py')], text=True,
+        capture_output=True, cwd=folder, env=dict(os.environ, MYPYPATH=':'.join(
+            str(ROOT / name) for name in ('', 'benchmarks/leaderboard', 'test/support'))))
+    assert re.search(r'checked \d\d+ source files', ran.stdout), ran.stdout + ran.stderr
+    lines = [line for line in ran.stdout.splitlines() if line.startswith(('bench_', 'leaderboard'))
+             and re.search(r'\[(call-arg|name-defined)\]|Module .* has no attribute', line)]
+    assert lines == []
