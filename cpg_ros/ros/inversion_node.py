@@ -251,7 +251,7 @@ def _summary(result: RecordingFit) -> str:
     fit = result.fit
     values = ', '.join(f'{name} {estimate.value:.4g} +- {estimate.stderr:.2g}'
                        for name, estimate in fit.parameters.items())
-    named = result.stride.verdict if len(result.stride.alike) > 1 else fit.gait
+    named = result.stride.verdict if len(result.stride.candidates) > 1 else fit.gait
     return (f'{named} at {result.stride.frequency:.4f} Hz, {values}, mean RMS error '
             f'{100 * fit.mean_rms_share:.1f} % of range')
 

@@ -74,7 +74,7 @@ def test_six_legs_and_their_gaits():
     for gait, wanted in HEXAPOD.items():
         assert np.allclose(list(phases(network, gait).values()), np.array(wanted) / 6), gait
         found = match_gait(phases(network, gait), network)
-        assert (found.gait, found.alike) == (gait, (gait,))
+        assert (found.gait, found.candidates) == (gait, (gait,))
 
 
 @pytest.mark.parametrize('legs', [6, 8, 12])

@@ -117,13 +117,13 @@ class FootContacts(ShortRepr):
             if begins.size < MIN_STRIDES:
                 return None
             # Of a foot that bounces, the begin of the longer contact counts.
-            own = phase(begins[stances > MIN_STANCE_RATIO * np.median(stances)])
-            middle = float(np.angle(np.exp(2j * np.pi * own).mean())) / (2.0 * np.pi)
-            off = (own - middle + 0.5) % 1.0 - 0.5
+            phases = phase(begins[stances > MIN_STANCE_RATIO * np.median(stances)])
+            middle = float(np.angle(np.exp(2j * np.pi * phases).mean())) / (2.0 * np.pi)
+            off = (phases - middle + 0.5) % 1.0 - 0.5
             if np.abs(off - np.median(off)).mean() > MAX_PHASE_SCATTER:
                 return None
             touchdowns[leg] = middle + float(np.median(off))
-        return {leg: (touchdowns[legs[0]] - own) % 1.0 for leg, own in touchdowns.items()}
+        return {leg: (touchdowns[legs[0]] - phase) % 1.0 for leg, phase in touchdowns.items()}
 
     def strides(self, leg: str) -> np.ndarray:
         """Return touchdown, duration and stance of a leg's strides, s, shape (k, 3)."""
@@ -176,16 +176,16 @@ def foot_contacts(loads: FootLoads, legs: Collection[str], begin: float, end: fl
         period: of a stride, s.
 
     """
-    named = _legs_named(loads.legs, legs)
-    if named is None:
+    foot_legs = _legs_of_feet(loads.legs, legs)
+    if foot_legs is None:
         return None
     inside = (loads.times >= begin) & (loads.times <= end)
     times, rows = loads.times[inside], loads.loads[inside]
     if len(times) < MIN_STRIDE_SAMPLES * (end - begin) / period or not np.isfinite(rows).all():
         return None
-    least, largest = np.percentile(rows, [LOW_PERCENTILE, HIGH_PERCENTILE], axis=0)
-    threshold = np.where(least > MAX_SWING_LOAD * largest, -np.inf,
-                         least + CONTACT_THRESHOLD * (largest - least))
+    smallest, largest = np.percentile(rows, [LOW_PERCENTILE, HIGH_PERCENTILE], axis=0)
+    threshold = np.where(smallest > MAX_SWING_LOAD * largest, -np.inf,
+                         smallest + CONTACT_THRESHOLD * (largest - smallest))
     down = rows > threshold
     # A foot that bounces touches down once.
     for state in (False, True):
@@ -194,10 +194,10 @@ def foot_contacts(loads: FootLoads, legs: Collection[str], begin: float, end: fl
                 inner = first > 0 and last + 1 < len(times)
                 if inner and times[last + 1] - times[first] < MIN_DURATION * period:
                     column[first:last + 1] = not state
-    return FootContacts(named, times, down, loads.by_motion)
+    return FootContacts(foot_legs, times, down, loads.by_motion)
 
 
-def _legs_named(names: Sequence[str], legs: Collection[str]) -> tuple[str, ...] | None:
+def _legs_of_feet(names: Sequence[str], legs: Collection[str]) -> tuple[str, ...] | None:
     """Return the leg of each foot by its name; None if there is not one foot for each leg."""
     if set(legs) <= set(names):
         return tuple(names)

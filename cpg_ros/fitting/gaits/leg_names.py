@@ -97,12 +97,12 @@ def words_of(name: str) -> list[str]:
     return [word if k <= side or word != 'r' else 'roll' for k, word in enumerate(words)]
 
 
-def _moved(words: Sequence[str]) -> Sequence[str]:
+def _moving_part(words: Sequence[str]) -> Sequence[str]:
     """Return the words of the part that a joint moves: not torso in torso_to_abduct."""
     return words[words.index('to') + 1:] if 'to' in words else words
 
 
-def _read(words: Sequence[str]) -> tuple[str, str, frozenset[str]]:
+def _leg_match(words: Sequence[str]) -> tuple[str, str, frozenset[str]]:
     """Return the leg of four or six, the leg of two ('' for none), and the words that name it."""
     codes = {CODES[word] for word in words if word in CODES}
     sides = {SIDES[word] for word in words if word in SIDES}
@@ -111,11 +111,11 @@ def _read(words: Sequence[str]) -> tuple[str, str, frozenset[str]]:
         return codes.pop(), '', frozenset(word for word in words if word in CODES)
     if codes or len(sides) != 1:
         return '', '', frozenset()
-    side, words_used = sides.pop(), frozenset(word for word in words if word in SIDES)
+    side, leg_words = sides.pop(), frozenset(word for word in words if word in SIDES)
     two = BIPED[side == 'r']
     if len(ends) == 1:
-        return side + ends.pop(), two, words_used | {word for word in words if word in ENDS}
-    return '', two, words_used
+        return side + ends.pop(), two, leg_words | {word for word in words if word in ENDS}
+    return '', two, leg_words
 
 
 def place_of(joints: Sequence[str]) -> tuple[str, str]:
@@ -123,8 +123,8 @@ def place_of(joints: Sequence[str]) -> tuple[str, str]:
 
     Both must be the same in all names.
     """
-    read = [_read(words_of(name))[:2] for name in joints]
-    sides, ends = {(four or two)[:1] for four, two in read}, {four[1:] for four, _ in read}
+    matches = [_leg_match(words_of(name))[:2] for name in joints]
+    sides, ends = {(four or two)[:1] for four, two in matches}, {four[1:] for four, _ in matches}
     return (sides.pop() if len(sides) == 1 else '', ends.pop() if len(ends) == 1 else '')
 
 
@@ -133,19 +133,19 @@ def limb_of(joints: Sequence[str]) -> str:
 
     Either ``other``, which is no leg, ``arm``, or ``upper``, an arm or a fore leg.
     """
-    words = {word for name in joints[:-1] or joints for word in _moved(words_of(name))}
-    return next((kind for kind, known in (('other', APPENDAGES), ('arm', ARMS),
-                                          ('upper', UPPER_LIMBS)) if words & known), '')
+    words = {word for name in joints[:-1] or joints for word in _moving_part(words_of(name))}
+    return next((kind for kind, vocabulary in (('other', APPENDAGES), ('arm', ARMS),
+                                               ('upper', UPPER_LIMBS)) if words & vocabulary), '')
 
 
 def role_of(name: str) -> str:
     """Return a joint's name without its leg, equal for the same joint of each leg."""
-    counted, rest = _NUMBERED_LEG.findall(name), _NUMBERED_LEG.sub('', name)
-    if len(counted) == 1 and any(sign.isalpha() for sign in rest):
+    numbers, rest = _NUMBERED_LEG.findall(name), _NUMBERED_LEG.sub('', name)
+    if len(numbers) == 1 and any(sign.isalpha() for sign in rest):
         return ' '.join(words_of(rest))
     words = words_of(name)
-    words_used = _read(words)[2]
-    return ' '.join(word for word in words if word not in words_used)
+    leg_words = _leg_match(words)[2]
+    return ' '.join(word for word in words if word not in leg_words)
 
 
 def legs_of(joints: Sequence[str]) -> Legs:
@@ -159,44 +159,45 @@ def legs_of(joints: Sequence[str]) -> Legs:
             two robots.
 
     """
-    counted = _counted(joints)
-    if counted:
-        words_used = {name: ('', '', frozenset(_NUMBERED_LEG.findall(name)[0]))
-                      for names in counted.values() for name in names}
-        return Legs(counted, _explanation(counted, words_used, joints), _rest(counted, joints))
+    by_number = _numbered_legs(joints)
+    if by_number:
+        leg_words = {name: ('', '', frozenset(_NUMBERED_LEG.findall(name)[0]))
+                     for names in by_number.values() for name in names}
+        return Legs(by_number, _explanation(by_number, leg_words, joints),
+                    _rest(by_number, joints))
     _refuse_two(joints)
     words = {name: words_of(name) for name in joints}
-    read = {name: _read(words[name]) for name in joints}
+    matches = {name: _leg_match(words[name]) for name in joints}
     # A code is a name's own, an L a hint: first four legs are looked for, or six.
-    more = HEXAPOD if any(read[name][0] in ('lm', 'rm') for name in joints) else QUADRUPED
-    for labels, column, others in ((more, 0, NON_LEGS), (BIPED, 1, NON_LEGS | UPPER_LIMBS)):
-        legs = {leg: tuple(name for name in joints if read[name][column] == leg
-                            and not others & set(_moved(words[name]))) for leg in labels}
-        there = [leg for leg in labels if legs[leg]]
-        if len(there) == len(labels):
+    more = HEXAPOD if any(matches[name][0] in ('lm', 'rm') for name in joints) else QUADRUPED
+    for labels, column, non_legs in ((more, 0, NON_LEGS), (BIPED, 1, NON_LEGS | UPPER_LIMBS)):
+        legs = {leg: tuple(name for name in joints if matches[name][column] == leg
+                            and not non_legs & set(_moving_part(words[name]))) for leg in labels}
+        present = [leg for leg in labels if legs[leg]]
+        if len(present) == len(labels):
             break
         # Two codes may be left and right of a biped by chance, three are a quadruped's.
-        if column == 0 and len(there) >= 2 and not _directions(there, read, joints):
-            raise LegsError(_missing(there, labels, read, joints))
+        if column == 0 and len(present) >= 2 and not _directions(present, matches, joints):
+            raise LegsError(_missing(present, labels, matches, joints))
     else:
-        if there:
-            raise LegsError(_missing(there, labels, read, joints))
+        if present:
+            raise LegsError(_missing(present, labels, matches, joints))
         raise LegsError(f'cannot identify legs from the joint names {_listed(list(joints))}; they '
                         'usually contain LF, RF, LH, RH, front_left ... or left, right; a robot '
                         'file (--robot) says which joint is whose')
-    return Legs(legs, _explanation(legs, read, joints), _rest(legs, joints))
+    return Legs(legs, _explanation(legs, matches, joints), _rest(legs, joints))
 
 
-def _counted(joints: Sequence[str]) -> dict[str, tuple[str, ...]]:
+def _numbered_legs(joints: Sequence[str]) -> dict[str, tuple[str, ...]]:
     """Return the joints of numbered legs, L1 R1 L2 ..., or nothing if they are not numbered.
 
     Each number of a joint occurs once; each number of a leg occurs with the same joints as others.
     """
     by_leg: dict[tuple[str, int], list[str]] = {}
     for name in joints:
-        words_used = _NUMBERED_LEG.findall(name)
-        if len(words_used) == 1:
-            by_leg.setdefault((words_used[0][0].lower(), int(words_used[0][1])), []).append(name)
+        leg_words = _NUMBERED_LEG.findall(name)
+        if len(leg_words) == 1:
+            by_leg.setdefault((leg_words[0][0].lower(), int(leg_words[0][1])), []).append(name)
     pairs = len(by_leg) // 2
     roles = {tuple(sorted(_NUMBERED_LEG.sub('', name) for name in names))
              for names in by_leg.values()}
@@ -213,35 +214,35 @@ def _refuse_two(joints: Sequence[str]) -> None:
     robots: dict[tuple[str, ...], dict[tuple[str, ...], str]] = {}
     for name in joints:
         words = words_of(name)
-        words_used = _read(words)[2]
-        index = next((k for k, word in enumerate(words) if word in words_used), 0)
+        leg_words = _leg_match(words)[2]
+        index = next((k for k, word in enumerate(words) if word in leg_words), 0)
         if index and not set(words[:index]) & set(JOINTS):
             robots.setdefault(tuple(words[:index]), {})[tuple(words[index:])] = name
-    for first, own in robots.items():
+    for prefix, names in robots.items():
         # With a single joint a leg, the word before may name the joint.
-        roles = {tuple(word for word in rest if word not in _read(rest)[2]) for rest in own}
-        other = next((robot_name for key, robot_name in robots.items() if key != first
-                      and set(robot_name) == set(own)), None)
+        roles = {tuple(word for word in rest if word not in _leg_match(rest)[2]) for rest in names}
+        other = next((other_names for key, other_names in robots.items() if key != prefix
+                      and set(other_names) == set(names)), None)
         if other is not None and len(roles) > 1:
             raise LegsError('joints of two robots are there, such as '
-                            f"'{next(iter(own.values()))}' and '{next(iter(other.values()))}'; "
+                            f"'{next(iter(names.values()))}' and '{next(iter(other.values()))}'; "
                             'name those of one (--joints)')
 
 
-def _directions(there: list[str], read: Mapping, joints: Sequence[str]) -> bool:
+def _directions(present: list[str], matches: Mapping, joints: Sequence[str]) -> bool:
     """Tell whether the front of right_hip_front is a direction, as beside right_knee.
 
     It is if joints without an end have names that those with an end lack.
     """
-    ended = [name for name in joints if read[name][0] in there]
-    plain = {role_of(name) for name in joints if read[name][1] and not read[name][0]
+    with_end = [name for name in joints if matches[name][0] in present]
+    plain = {role_of(name) for name in joints if matches[name][1] and not matches[name][0]
              and not (NON_LEGS | UPPER_LIMBS) & set(words_of(name))}
-    return (len({leg[1] for leg in there}) == 1 and all(read[name][1] for name in ended)
-            and bool(plain) and plain.isdisjoint(map(role_of, ended)))
+    return (len({leg[1] for leg in present}) == 1 and all(matches[name][1] for name in with_end)
+            and bool(plain) and plain.isdisjoint(map(role_of, with_end)))
 
 
 def _rest(legs: Mapping[str, tuple[str, ...]], joints: Sequence[str]) -> tuple[str, ...]:
-    return tuple(name for name in joints if not any(name in listed for listed in legs.values()))
+    return tuple(name for name in joints if not any(name in names for names in legs.values()))
 
 
 def _listed(names: list[str]) -> str:
@@ -249,24 +250,24 @@ def _listed(names: list[str]) -> str:
     return f'{shown} and {len(names) - 6} more' if len(names) > 6 else shown or '(none)'
 
 
-def _missing(there: list[str], labels: tuple[str, ...], read: Mapping, joints: Sequence[str]
+def _missing(present: list[str], labels: tuple[str, ...], matches: Mapping, joints: Sequence[str]
              ) -> str:
-    lacking = ', '.join(leg for leg in labels if leg not in there)
+    lacking = ', '.join(leg for leg in labels if leg not in present)
     column = 1 if labels == BIPED else 0
-    example = next(name for name in joints if read[name][column] in there)
-    return (f"joints of the legs {', '.join(there)} are there (such as '{example}'), but none of "
-            f'{lacking}')
+    example = next(name for name in joints if matches[name][column] in present)
+    return (f"joints of the legs {', '.join(present)} are there (such as '{example}'), but none "
+            f'of {lacking}')
 
 
-def _explanation(legs: Mapping[str, tuple[str, ...]], read: Mapping,
+def _explanation(legs: Mapping[str, tuple[str, ...]], matches: Mapping,
                  joints: Sequence[str]) -> str:
     parts = []
     for leg, names in legs.items():
-        words_used = sorted({'_'.join(word for word in words_of(name) if word in read[name][2])
-                             for name in names})
-        shown = f'{names[0]} ... {names[-1]}' if len(names) > 2 else ', '.join(names)
-        parts.append(f"{leg} by '{' or '.join(words_used)}' ({len(names)} joint"
-                     f"{'s' if len(names) > 1 else ''}: {shown})")
+        leg_words = sorted({'_'.join(word for word in words_of(name) if word in matches[name][2])
+                            for name in names})
+        text = f'{names[0]} ... {names[-1]}' if len(names) > 2 else ', '.join(names)
+        parts.append(f"{leg} by '{' or '.join(leg_words)}' ({len(names)} joint"
+                     f"{'s' if len(names) > 1 else ''}: {text})")
     rest = _rest(legs, joints)
     return ('legs read from the names: ' + '; '.join(parts)
             + (f'; of no leg: {_listed(list(rest))}' if rest else ''))

@@ -79,25 +79,25 @@ def phase_scatter(phases: np.ndarray, x: np.ndarray, average: PhaseAverage,
     stride = np.floor(theta - theta[0]).astype(int)
     count = int(stride[-1]) + 1
     order = np.arange(len(average.coefficients))[:, None]
-    turned = replace(average, coefficients=2j * np.pi * order * average.coefficients)
+    slope_average = replace(average, coefficients=2j * np.pi * order * average.coefficients)
     along, power = np.zeros((2, len(legs), count))
     for part in blocks(phases):
-        there = np.isfinite(x[part])
-        slopes = np.where(there, turned.mean(theta[part]).T, 0.0)
-        left = np.where(there, x[part] - average.mean(theta[part]).T, 0.0)
+        finite = np.isfinite(x[part])
+        slopes = np.where(finite, slope_average.mean(theta[part]).T, 0.0)
+        residual = np.where(finite, x[part] - average.mean(theta[part]).T, 0.0)
         for row, joints in enumerate(legs.values()):
             columns = [names.index(name) for name in joints]
-            for sums, values in ((along, left), (power, slopes)):
+            for sums, values in ((along, residual), (power, slopes)):
                 sums[row] += np.bincount(
                     stride[part], np.sum(values[:, columns] * slopes[:, columns], axis=1), count)
     reliable = power > MIN_POWER_RATIO * np.median(power, axis=1, keepdims=True)
-    early = np.full_like(along, np.nan)
-    early[reliable] = along[reliable] / power[reliable]
-    return {leg: _scatter(row - early[0]) for leg, row in zip(legs, early, strict=True)}
+    leads = np.full_like(along, np.nan)
+    leads[reliable] = along[reliable] / power[reliable]
+    return {leg: _scatter(row - leads[0]) for leg, row in zip(legs, leads, strict=True)}
 
 
-def _scatter(early: np.ndarray) -> PhaseScatter:
-    reliable = early[np.isfinite(early)]
+def _scatter(leads: np.ndarray) -> PhaseScatter:
+    reliable = leads[np.isfinite(leads)]
     if reliable.size < MIN_STRIDES:
         return PhaseScatter(np.nan, np.nan, np.nan, reliable.size)
     spread = float(reliable.std(ddof=1))
@@ -140,12 +140,12 @@ def foot(angles: Sequence[np.ndarray], pair: str) -> np.ndarray:
     """
     from scipy.spatial.transform import Rotation
 
-    turned, position = Rotation.identity(), np.zeros((angles[0].size, 3))
+    rotation, position = Rotation.identity(), np.zeros((angles[0].size, 3))
     for k, (axis, angle) in enumerate(zip(AXES, angles, strict=True)):
-        turned = turned * Rotation.from_euler(axis, angle[:, None])
+        rotation = rotation * Rotation.from_euler(axis, angle[:, None])
         if k in SEGMENT_JOINTS:
             length = SEGMENT_LENGTHS[pair][SEGMENT_JOINTS.index(k)]
-            position -= length * turned.apply((0.0, 0.0, 1.0))
+            position -= length * rotation.apply((0.0, 0.0, 1.0))
     return position
 
 
@@ -196,7 +196,7 @@ class GaitMatch:
         nearest: nearest gait.
         distance: from the nearest gait, cycles: RMS over the legs after the best common shift.
         margin: additional distance of the next distinct gait, cycles.
-        alike: gaits that cannot be distinguished from the nearest, including it.
+        candidates: gaits that cannot be distinguished from the nearest, including it.
         probability: that the nearest gait is right, given the scatter of legs' phases.
         notes: one line each.
 
@@ -206,7 +206,7 @@ class GaitMatch:
     nearest: str
     distance: float
     margin: float
-    alike: tuple[str, ...]
+    candidates: tuple[str, ...]
     probability: float
     notes: tuple[str, ...]
 
@@ -274,16 +274,17 @@ def leg_phases(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]
         base, pairs = next(((base_leg, base_pairs) for base_leg in phases
                             if (base_pairs := _pairs(legs[base_leg], joints))), ('', []))
         if pairs:
-            ahead, mirrored, sense_known = _shift(pairs, c)
-            opposite += mirrored
-            vague += [] if sense_known else [leg]
+            ahead, flips, has_sense = _shift(pairs, c)
+            opposite += flips
+            vague += [] if has_sense else [leg]
         else:
             base = next(iter(phases))
-            most = [max(names, key=lambda name: np.abs(c[name][1]))
-                    for names in (legs[base], joints)]
-            ahead = float(np.angle(c[most[1]][1] / c[most[0]][1])) / (2.0 * np.pi)
+            strongest = [max(names, key=lambda name: np.abs(c[name][1]))
+                         for names in (legs[base], joints)]
+            ahead = float(np.angle(c[strongest[1]][1] / c[strongest[0]][1])) / (2.0 * np.pi)
             notes.append(f'{leg} has no joint named like one of {base}: its phase is that of '
-                         f'{most[1]} against {most[0]}, half a cycle off if their senses differ')
+                         f'{strongest[1]} against {strongest[0]}, half a cycle off if their '
+                         'senses differ')
             vague.append(leg)
         # A phase that rounds to a whole cycle is 0.
         phases[leg] = round((phases[base] + ahead) % 1.0, 9) % 1.0
@@ -300,14 +301,14 @@ def _shift(pairs: list[tuple[str, str]], c: Mapping[str, np.ndarray]
     Also return the joints with opposite sign conventions, and whether any convention is known.
     """
     power = {pair: _power(c[pair[0]]) * _power(c[pair[1]]) for pair in pairs}
-    least = MIN_VARIANCE_RATIO**2 * max(power.values())
+    min_power = MIN_VARIANCE_RATIO**2 * max(power.values())
     senses = {pair: _sense(c[pair[0]], c[pair[1]]) for pair in pairs}
     # Pairs whose sense is known come first: the other pairs have to agree with them.
-    pairs = sorted(pairs, key=lambda pair: (not (senses[pair] and power[pair] >= least),
+    pairs = sorted(pairs, key=lambda pair: (not (senses[pair] and power[pair] >= min_power),
                                             -power[pair]))
-    sense_known = bool(senses[pairs[0]])
+    has_sense = bool(senses[pairs[0]])
     total: np.ndarray | None = None
-    mirrored = []
+    flips = []
     for first, other in pairs:
         terms = _cross(c[other], c[first])
         sense = senses[first, other]
@@ -319,26 +320,26 @@ def _shift(pairs: list[tuple[str, str]], c: Mapping[str, np.ndarray]
             phasor = np.exp(-2j * np.pi * np.arange(terms.size) * best_shift(total)[0])
             sense = 1.0 if np.sum(terms * phasor).real >= 0.0 else -1.0
         if sense < 0.0:
-            mirrored.append(other)
+            flips.append(other)
         total = total + sense * terms
     assert total is not None
-    return float(best_shift(total)[0]), mirrored, sense_known
+    return float(best_shift(total)[0]), flips, has_sense
 
 
 def _symmetry(network: type[Network], gait: str) -> Any:
     return network.presets()[gait].network.symmetry(gait)
 
 
-def _reversed(network: type[Network], gait: str, symmetry: Any) -> bool:
+def _has_reverse(network: type[Network], gait: str, symmetry: Any) -> bool:
     """Tell whether the gait with all shifts negated is another one of the network's."""
-    turned = {name: -shift % 1 for name, shift in symmetry.shifts}
+    reverse_shifts = {name: -shift % 1 for name, shift in symmetry.shifts}
     others = [_symmetry(network, other) for other in network.gaits() if other != gait]
     # A gait of another group has other names of elements: compare the phases instead.
-    return any(dict(other.shifts) == turned if other.group == symmetry.group
+    return any(dict(other.shifts) == reverse_shifts if other.group == symmetry.group
                else np.allclose(other.phases, -symmetry.phases % 1.0) for other in others)
 
 
-def _apart(phases: np.ndarray, target: np.ndarray, waves: np.ndarray) -> float:
+def _phase_distance(phases: np.ndarray, target: np.ndarray, waves: np.ndarray) -> float:
     """Return the distance of leg phases; between different waveforms any phase is allowed."""
     squares = [nearest_gait(phases[waves == wave], {'': target[waves == wave]})[1]**2
                * np.count_nonzero(waves == wave) for wave in np.unique(waves)]
@@ -361,42 +362,43 @@ def match_gait(phases: Mapping[str, float], network: type[Network]) -> GaitMatch
         network: with the gaits.
 
     """
-    own = np.array(list(phases.values()))
-    cells = [listed[0] - 1 for listed in next(iter(network.legs.values())).values()]
-    apart, size = {}, {}
+    values = np.array(list(phases.values()))
+    cells = [numbers[0] - 1 for numbers in next(iter(network.legs.values())).values()]
+    distance, size = {}, {}
     for gait in (name for name in network.gaits() if name != network.unnamed):
         symmetry = _symmetry(network, gait)
         target, waves = symmetry.phases[cells], symmetry.waves[cells]
         if symmetry.leads:
             # Stated, in either sense, between whatever waveforms.
-            apart[gait], size[gait] = _apart(own, target, np.zeros_like(waves)), 0
+            distance[gait], size[gait] = _phase_distance(values, target, np.zeros_like(waves)), 0
             continue
-        apart[gait] = _apart(own, target, waves)
+        distance[gait] = _phase_distance(values, target, waves)
         # A wave that runs round may do so in both senses, where these are not two gaits.
-        if not _reversed(network, gait, symmetry):
-            apart[gait] = min(apart[gait], _apart(own, -target, waves))
+        if not _has_reverse(network, gait, symmetry):
+            distance[gait] = min(distance[gait], _phase_distance(values, -target, waves))
         size[gait] = -symmetry.waves.max()
-    fits = [gait for gait in apart if apart[gait] <= max(GAIT_TOLERANCE, min(apart.values()))]
-    nearest = min(fits, key=lambda gait: (-size[gait], round(apart[gait], 9)))
+    fits = [gait for gait in distance
+            if distance[gait] <= max(GAIT_TOLERANCE, min(distance.values()))]
+    nearest = min(fits, key=lambda gait: (-size[gait], round(distance[gait], 9)))
     # Others with the same phases of the legs; less constrained ones never fit worse.
-    same = [gait for gait in fits if size[gait] == size[nearest]
-            and abs(apart[gait] - apart[nearest]) < 1e-9]
-    margin = min((apart[gait] for gait in apart if gait not in same
-                  and size[gait] >= size[nearest]), default=np.inf) - apart[nearest]
-    rivals = [gait for gait in apart if gait != nearest and size[gait] >= size[nearest]]
-    odds = [_odds(apart[nearest], apart[gait], own.size) for gait in rivals]
+    candidates = [gait for gait in fits if size[gait] == size[nearest]
+                  and abs(distance[gait] - distance[nearest]) < 1e-9]
+    margin = min((distance[gait] for gait in distance if gait not in candidates
+                  and size[gait] >= size[nearest]), default=np.inf) - distance[nearest]
+    rivals = [gait for gait in distance if gait != nearest and size[gait] >= size[nearest]]
+    odds = [_odds(distance[nearest], distance[gait], values.size) for gait in rivals]
     notes = []
-    if len(same) > 1:
-        notes.append(f"the legs move alike in {', '.join(same)}: only which of a leg's cells "
-                     'drives which joint tells them apart')
+    if len(candidates) > 1:
+        notes.append(f"the legs move alike in {', '.join(candidates)}: only which of a leg's "
+                     'cells drives which joint tells them apart')
     order = [leg for leg, _ in sorted(phases.items(), key=lambda item: -item[1] % 1.0)]
     if nearest == 'walk' and len(order) == len(network.girdles) == 4:
         # After a hind leg comes the fore one of its side, or the other; after a fore one not.
         beside = network.sides[order[1]] == network.sides[order[0]]
         kind = 'lateral' if beside == (network.girdles[order[0]] == 'hind') else 'diagonal'
         notes.append(f'{kind} sequence: {", ".join(order).upper()}')
-    named = nearest if apart[nearest] <= GAIT_TOLERANCE else None
-    return GaitMatch(named, nearest, apart[nearest], margin, tuple(same),
+    gait_name = nearest if distance[nearest] <= GAIT_TOLERANCE else None
+    return GaitMatch(gait_name, nearest, distance[nearest], margin, tuple(candidates),
                      1.0 / (1.0 + sum(odds)), tuple(notes))
 
 
@@ -410,12 +412,12 @@ def match_gait_by_cells(c: np.ndarray, network: type[Network]) -> GaitMatch:
     """
     table = {gait: _symmetry(network, gait) for gait in network.gaits()}
     cycle = evaluate_coefficients(c, np.arange(SAMPLES) / SAMPLES).T
-    recognised = recognise(cycle, next(iter(table.values())).group, table, SYMMETRY_TOLERANCE)
+    result = recognise(cycle, next(iter(table.values())).group, table, SYMMETRY_TOLERANCE)
     # What a wave is off from itself that is early by the distance.
     distance, second = (float(np.arcsin(min(0.5 * size, 1.0)) / np.pi)
-                        for size in (recognised.distance, recognised.distance + recognised.margin))
-    return GaitMatch(recognised.name, recognised.nearest, distance, second - distance,
-                     (recognised.nearest,),
+                        for size in (result.distance, result.distance + result.margin))
+    return GaitMatch(result.name, result.nearest, distance, second - distance,
+                     (result.nearest,),
                      1.0 / (1.0 + _odds(distance, second, network.cells)), ())
 
 
@@ -429,7 +431,7 @@ def walk_or_run(match: GaitMatch, contacts: FootContacts | None, falling: float 
         falling: fraction of the stride in which the body falls freely, if its height is known.
 
     """
-    if set(match.alike) != {'walk', 'run'}:
+    if set(match.candidates) != {'walk', 'run'}:
         return match
     evidence = [] if contacts is None else [(contacts.gait, f'by {contacts.source}: {contacts}')]
     if falling is not None:
@@ -437,10 +439,10 @@ def walk_or_run(match: GaitMatch, contacts: FootContacts | None, falling: float 
         evidence.insert(0 if contacts is None or contacts.by_motion else 1, (
             'walk' if falling <= MAX_WALK_FALL else 'run' if falling >= MIN_RUN_FALL else None,
             f'by the height of the body, which falls freely in {falling:.0%} of the stride'))
-    gait, why = next(((name, words) for name, words in evidence if name), (None, ''))
+    gait, reason = next(((name, text) for name, text in evidence if name), (None, ''))
     if gait is None:
         return match
     # The other one was a rival with even odds.
-    return replace(match, gait=match.gait and gait, nearest=gait, alike=(gait,),
+    return replace(match, gait=match.gait and gait, nearest=gait, candidates=(gait,),
                    probability=1.0 / (1.0 / match.probability - 1.0),
-                   notes=(f'{gait}, {why}',))
+                   notes=(f'{gait}, {reason}',))

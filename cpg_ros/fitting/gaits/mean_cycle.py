@@ -75,10 +75,10 @@ def resolvable_harmonics(t: np.ndarray, period: float) -> int:
     # Loaded where it is used, as is all of scipy here, for programs that fit nothing.
     from scipy.linalg import toeplitz
 
-    most = min(MAX_HARMONICS, (t.size - 1) // 4)
+    limit = min(MAX_HARMONICS, (t.size - 1) // 4)
     bins = (t / period % 1.0 * PHASE_BINS).astype(int) % PHASE_BINS
-    sums = np.fft.fft(np.bincount(bins, minlength=PHASE_BINS))[:2 * most + 1] / t.size
-    low, high = 0, most + 1
+    sums = np.fft.fft(np.bincount(bins, minlength=PHASE_BINS))[:2 * limit + 1] / t.size
+    low, high = 0, limit + 1
     while high - low > 1:
         middle = (low + high) // 2
         if np.linalg.eigvalsh(toeplitz(sums[:2 * middle + 1]))[0] > MIN_EIGENVALUE:
@@ -145,7 +145,7 @@ class PhaseAverage(ShortRepr):
         spread: standard deviation of a cycle about the mean, rad, (joints, m).
         error: standard error of the mean, rad, (joints, m).
         spikes: number of samples dropped, (joints,).
-        left: variance about the mean over all variance, (joints,).
+        residual: variance about the mean over all variance, (joints,).
 
     """
 
@@ -154,7 +154,7 @@ class PhaseAverage(ShortRepr):
     spread: np.ndarray
     error: np.ndarray
     spikes: np.ndarray
-    left: np.ndarray
+    residual: np.ndarray
 
     def mean(self, theta: np.ndarray) -> np.ndarray:
         """Return the mean cycles at theta in cycles, shape (joints, m)."""
@@ -193,53 +193,53 @@ def average_cycles(phases: np.ndarray, positions: np.ndarray, theta: np.ndarray,
         InputError: a joint has too few samples.
 
     """
-    there = np.isfinite(positions)
+    finite = np.isfinite(positions)
     joints = positions.shape[1]
     weights = np.zeros((2 * AVERAGE_HARMONICS + 1, joints))
     rests: list[tuple[np.ndarray, np.ndarray, int]] = [None] * joints  # type: ignore[list-item]
-    spikes, left = np.zeros(joints, dtype=int), np.zeros(joints)
+    spikes, residual = np.zeros(joints, dtype=int), np.zeros(joints)
     # Joints that come in the same messages have the same samples.
     groups: dict[bytes, list[int]] = {}
-    for joint, column in enumerate(np.packbits(there, axis=0).T):
+    for joint, column in enumerate(np.packbits(finite, axis=0).T):
         groups.setdefault(column.tobytes(), []).append(joint)
-    for alike in groups.values():
-        mask = there[:, alike[0]]
+    for columns in groups.values():
+        mask = finite[:, columns[0]]
         # A view where it can be: a long recording is large.
-        at, x = phases[mask], (positions.T if len(alike) == joints and mask.all()
-                               else positions.T[np.ix_(alike, mask)])
-        weights[:, alike], rest, bins = _fitted(at, x)
-        for row, joint in enumerate(alike):
-            far, variance = np.abs(rest[row]), float(x[row].var())
-            keep = far <= max(SPIKE_MEDIAN_RATIO * np.median(far),
-                              SPIKE_STD_RATIO * np.sqrt(variance))
+        at, x = phases[mask], (positions.T if len(columns) == joints and mask.all()
+                               else positions.T[np.ix_(columns, mask)])
+        weights[:, columns], rest, bins = _fit(at, x)
+        for row, joint in enumerate(columns):
+            deviation, variance = np.abs(rest[row]), float(x[row].var())
+            keep = deviation <= max(SPIKE_MEDIAN_RATIO * np.median(deviation),
+                                    SPIKE_STD_RATIO * np.sqrt(variance))
             rests[joint] = at, rest[row], bins
             if not keep.all():
-                some, own, fewer = _fitted(at[keep], x[row:row + 1, keep])
-                weights[:, joint], rests[joint] = some[:, 0], (at[keep], own[0], fewer)
+                weight, rows, size = _fit(at[keep], x[row:row + 1, keep])
+                weights[:, joint], rests[joint] = weight[:, 0], (at[keep], rows[0], size)
             spikes[joint] = np.count_nonzero(~keep)
-            left[joint] = rests[joint][1].var() / max(variance, 1e-300)
+            residual[joint] = rests[joint][1].var() / max(variance, 1e-300)
     c = coefficients_of(weights)
     first_harmonic = c[1, list(first)]
     zero = -float(np.angle(first_harmonic[np.argmax(np.abs(first_harmonic))])) / (2.0 * np.pi)
-    turned = c * np.exp(2j * np.pi * zero * np.arange(len(c)))[:, None]
+    coefficients = c * np.exp(2j * np.pi * zero * np.arange(len(c)))[:, None]
     scatter = [_scatter(at - zero, rest, bins, theta) for at, rest, bins in rests]
     spread, error = (np.array(values) for values in zip(*scatter, strict=True))
-    return PhaseAverage(zero, turned, spread, error, spikes, left)
+    return PhaseAverage(zero, coefficients, spread, error, spikes, residual)
 
 
-def _fitted(phases: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
+def _fit(phases: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
     """Fit the series of joints with the same samples; return weights, rest and its bins."""
     n = min(resolvable_harmonics(phases - phases[0], 1.0),
             AVERAGE_HARMONICS) if phases.size > 4 else 0
     if n < 1:
         raise InputError(f'{phases.size} samples leave too much of the cycle empty')
-    some = mean_weights(x, phases, n)
+    fit = mean_weights(x, phases, n)
     rest = np.empty_like(x)
     for part in blocks(phases):
-        rest[:, part] = x[:, part] - evaluate_series(some, rows_of(phases[part], n))
+        rest[:, part] = x[:, part] - evaluate_series(fit, rows_of(phases[part], n))
     weights = np.zeros((2 * AVERAGE_HARMONICS + 1, len(x)))
     weights[:1 + n], weights[1 + AVERAGE_HARMONICS:1 + AVERAGE_HARMONICS
-                             + n] = some[:1 + n], some[1 + n:]
+                             + n] = fit[:1 + n], fit[1 + n:]
     return weights, rest, 2 * n + 1
 
 

@@ -145,14 +145,14 @@ def grow_stretch(times: np.ndarray, positions: np.ndarray, seed: Stretch) -> Rou
               & (sizes**2 >= MIN_COHERENCE * np.einsum('bj,bj->b', z, z.conj()).real))
     if len(z) > NUM_BLOCKS:
         steady &= np.abs(rates / rate - 1.0) <= RATE_TOLERANCE
-    first, last = longest_run(steady & _joined(steady, inside)) or (0, len(z) - 1)
+    first, last = longest_run(steady & _runs_containing(steady, inside)) or (0, len(z) - 1)
     # An incomplete block at the end of the recording is no reason to stop before it.
     end = times[-1] if last == len(z) - 1 else middles[last] + 0.5 * period
     return RoughPhase(max(middles[first] - 0.5 * period, times[0]), min(end, times[-1]),
                       middles[first:last + 1], phases[first:last + 1])
 
 
-def _joined(steady: np.ndarray, inside: np.ndarray) -> np.ndarray:
+def _runs_containing(steady: np.ndarray, inside: np.ndarray) -> np.ndarray:
     """Mark the runs of steady positions that contain one of those inside."""
     number = np.cumsum(np.diff(steady, prepend=False))
     return np.isin(number, number[steady & inside])
@@ -176,18 +176,18 @@ def estimate_phase(times: np.ndarray, positions: np.ndarray, rough: RoughPhase) 
     inside = index_range(grid, rough.begin, rough.end)
     # What is interpolated where many samples are missing is no motion.
     steps = np.diff(times[within])
-    known = steps[np.clip(np.searchsorted(times[within], grid) - 1, 0, steps.size - 1)] <= (
+    dense = steps[np.clip(np.searchsorted(times[within], grid) - 1, 0, steps.size - 1)] <= (
         GAP_RATIO * max(float(np.median(steps)), grid[1] - grid[0]))
-    grid, x = grid[inside][known[inside]] - rough.begin, y.T[:, inside][:, known[inside]]
+    grid, x = grid[inside][dense[inside]] - rough.begin, y.T[:, inside][:, dense[inside]]
     if span * slope < MIN_CYCLES:
-        phases, error = _straight(grid, x, np.array([level, level + slope * span]), span)
+        phases, error = _fit_constant_rate(grid, x, np.array([level, level + slope * span]), span)
         return PhaseEstimate(np.array([rough.begin, rough.end]), phases,
                              float(phases[1] - phases[0]) / span, error)
     knots = np.linspace(0.0, span, round(span * slope) + 1)
-    phases = _extended(knots + rough.begin, rough.times, rough.phases, slope)
+    phases = _prolong(knots + rough.begin, rough.times, rough.phases, slope)
     while True:
-        phases = _bent(grid, x, knots, phases)
-        first, last = _steady(grid, x, knots, phases)
+        phases = _refine(grid, x, knots, phases)
+        first, last = _steady_strides(grid, x, knots, phases)
         if last - first == knots.size - 2 or phases[last + 1] - phases[first] < MIN_CYCLES:
             break
         knots, phases = knots[first:last + 2], phases[first:last + 2]
@@ -221,15 +221,15 @@ def _mean_rate(knots: np.ndarray, phases: np.ndarray) -> tuple[float, float]:
     n = rates.size
     off, free = rates - rates.mean(), n - 1
     if n >= MIN_DRIFT_RATES:
-        centred = np.arange(n) - 0.5 * (n - 1)
-        off, free = off - centred * (centred @ rates) / (centred @ centred), n - 2
-    own = float(off @ off) / max(free, 1)
-    next_ = float(off[1:] @ off[:-1]) / max(n - 1, 1)
-    errors = min(max((0.25 * own - next_) / 1.5, 0.0), 0.499 * own)
-    wander = 1.5 * (own - 2.0 * errors)
-    if own <= 0.0:
+        offsets = np.arange(n) - 0.5 * (n - 1)
+        off, free = off - offsets * (offsets @ rates) / (offsets @ offsets), n - 2
+    total = float(off @ off) / max(free, 1)
+    covariance = float(off[1:] @ off[:-1]) / max(n - 1, 1)
+    errors = min(max((0.25 * total - covariance) / 1.5, 0.0), 0.499 * total)
+    wander = 1.5 * (total - 2.0 * errors)
+    if total <= 0.0:
         return float(rates.mean()), 0.0
-    bands = np.stack([np.full(n, wander / 6.0 - errors), np.full(n, own)])
+    bands = np.stack([np.full(n, wander / 6.0 - errors), np.full(n, total)])
     weights = solveh_banded(bands, np.ones(n))
     weights /= weights.sum()
     uneven, steps = weights - 1.0 / n, np.diff(weights, prepend=0.0, append=0.0)
@@ -239,60 +239,60 @@ def _mean_rate(knots: np.ndarray, phases: np.ndarray) -> tuple[float, float]:
     return float(weights @ rates), float(np.sqrt(max(variance, 0.0)))
 
 
-def _extended(at: np.ndarray, times: np.ndarray, phases: np.ndarray, slope: float) -> np.ndarray:
+def _prolong(at: np.ndarray, times: np.ndarray, phases: np.ndarray, slope: float) -> np.ndarray:
     """Interpolate phases, and continue them with a slope."""
     inner = np.interp(at, times, phases)
     return inner + slope * (np.minimum(at - times[0], 0.0) + np.maximum(at - times[-1], 0.0))
 
 
-def _model(x: np.ndarray, phases: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _fit_mean_cycle(x: np.ndarray, phases: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Fit the mean cycle; return what it leaves, and its slope by phase."""
     weights = mean_weights(x, phases, HARMONICS)
-    turned = 2.0 * np.pi * slopes_of(weights)
-    left, slope = np.empty_like(x), np.empty_like(x)
+    slope_weights = 2.0 * np.pi * slopes_of(weights)
+    residual, slope = np.empty_like(x), np.empty_like(x)
     for part in blocks(phases):
         rows = rows_of(phases[part], HARMONICS)
-        left[:, part] = x[:, part] - evaluate_series(weights, rows)
-        slope[:, part] = evaluate_series(turned, rows)
-    return left, slope
+        residual[:, part] = x[:, part] - evaluate_series(weights, rows)
+        slope[:, part] = evaluate_series(slope_weights, rows)
+    return residual, slope
 
 
-def _straight(grid: np.ndarray, x: np.ndarray, phases: np.ndarray, span: float
+def _fit_constant_rate(grid: np.ndarray, x: np.ndarray, phases: np.ndarray, span: float
               ) -> tuple[np.ndarray, float]:
     """Fit a constant rate with the mean cycle eliminated; return phases and error."""
-    centred = grid - 0.5 * span
+    offsets = grid - 0.5 * span
     for _ in range(2 * GAUSS_NEWTON_STEPS):
         at = np.interp(grid, [0.0, span], phases)
-        left, slope = _model(x, at)
-        by_rate, rows = centred * slope, rows_of(at, HARMONICS)
+        residual, slope = _fit_mean_cycle(x, at)
+        by_rate, rows = offsets * slope, rows_of(at, HARMONICS)
         by_rate -= evaluate_series(fit_series(by_rate, rows), rows)
         power = float(np.sum(by_rate * by_rate))
-        step = float(np.sum(by_rate * left)) / max(power, 1e-300)
+        step = float(np.sum(by_rate * residual)) / max(power, 1e-300)
         step = float(np.clip(step, -MAX_STEP / span, MAX_STEP / span))
         phases = phases + step * span * np.array([-0.5, 0.5])
         if abs(step) * span < 1e-6:
             break
     # Blocks of an eighth of a cycle, all joints together, vary independently; the few harmonics
     # have taken their part of what is left.
-    scores = np.einsum('jn,jn->n', by_rate, left)
+    scores = np.einsum('jn,jn->n', by_rate, residual)
     block = (np.interp(grid, [0.0, span], phases - phases[0]) * NUM_BLOCKS).astype(int)
     sums = np.bincount(block, scores)
     free = max(1.0 - (2 * HARMONICS + 1) / grid.size, 0.1)
-    own = float(np.sqrt(np.sum(sums**2)) / max(power, 1e-300) / free)
+    error = float(np.sqrt(np.sum(sums**2)) / max(power, 1e-300) / free)
     # Strides wander besides, slowly: what blocks and their neighbours are early or late together
     # is that, and counts once a cycle. The mean cycle takes one cycle's part of it.
-    early = (np.bincount(block, np.einsum('jn,jn->n', slope, left))
+    leads = (np.bincount(block, np.einsum('jn,jn->n', slope, residual))
              / np.maximum(np.bincount(block, np.einsum('jn,jn->n', slope, slope)), 1e-300))
     cycles = float(phases[1] - phases[0])
-    together = float(np.sum(early[1:] * early[:-1])) / max(early.size - 1, 1)
-    wander = max(together, 0.0) / max(1.0 - 1.0 / cycles, 0.1)**2
-    return phases, float(np.hypot(own, np.sqrt(12.0 * wander / cycles) / span))
+    covariance = float(np.sum(leads[1:] * leads[:-1])) / max(leads.size - 1, 1)
+    wander = max(covariance, 0.0) / max(1.0 - 1.0 / cycles, 0.1)**2
+    return phases, float(np.hypot(error, np.sqrt(12.0 * wander / cycles) / span))
 
 
-def _steady(grid: np.ndarray, x: np.ndarray, knots: np.ndarray, phases: np.ndarray
+def _steady_strides(grid: np.ndarray, x: np.ndarray, knots: np.ndarray, phases: np.ndarray
             ) -> tuple[int, int]:
     """Return first and last stride of the longest run, between knots, that resembles the mean."""
-    left, _ = _model(x, np.interp(grid, knots, phases))
+    residual, _ = _fit_mean_cycle(x, np.interp(grid, knots, phases))
     starts = np.minimum(np.searchsorted(grid, knots[:-1]), grid.size - 1)
     counts = np.maximum(np.diff(np.append(starts, grid.size)), 1)
 
@@ -303,45 +303,47 @@ def _steady(grid: np.ndarray, x: np.ndarray, knots: np.ndarray, phases: np.ndarr
     def products(a: np.ndarray, b: np.ndarray) -> np.ndarray:
         return (sums(a * b) - sums(a) * sums(b) / counts).sum(axis=0)
 
-    mean = x - left
-    alike, power, typical = products(x, mean), products(x, x), products(mean, mean)
+    mean = x - residual
+    overlap, power, typical = products(x, mean), products(x, x), products(mean, mean)
     rates = np.diff(phases) / np.diff(knots)
     first, last = longest_run((np.abs(rates / np.median(rates) - 1.0) <= RATE_TOLERANCE)
-                              & (alike >= MIN_AMPLITUDE_RATIO * typical)
-                              & (alike <= MAX_AMPLITUDE_RATIO * typical)
-                              & (alike * np.abs(alike) >= MIN_COHERENCE * power * typical)
+                              & (overlap >= MIN_AMPLITUDE_RATIO * typical)
+                              & (overlap <= MAX_AMPLITUDE_RATIO * typical)
+                              & (overlap * np.abs(overlap) >= MIN_COHERENCE * power * typical)
                               ) or (0, rates.size - 1)
-    apart = products(left, left)
+    misfit = products(residual, residual)
     off = np.abs(rates - np.median(rates))
-    odd = ((apart > np.maximum(OUTLIER_RATIO**2 * np.median(apart), MIN_OUTLIER**2 * typical))
-           | (off > max(RATE_OUTLIER_RATIO * np.median(off), MIN_RATE_OUTLIER * np.median(rates))))
-    while last - first > 2 and odd[first]:
+    outlier = ((misfit
+                > np.maximum(OUTLIER_RATIO**2 * np.median(misfit), MIN_OUTLIER**2 * typical))
+               | (off > max(RATE_OUTLIER_RATIO * np.median(off),
+                            MIN_RATE_OUTLIER * np.median(rates))))
+    while last - first > 2 and outlier[first]:
         first += 1
-    while last - first > 2 and odd[last]:
+    while last - first > 2 and outlier[last]:
         last -= 1
     return first, last
 
 
-def _bent(grid: np.ndarray, x: np.ndarray, knots: np.ndarray, phases: np.ndarray) -> np.ndarray:
+def _refine(grid: np.ndarray, x: np.ndarray, knots: np.ndarray, phases: np.ndarray) -> np.ndarray:
     """Fit the phase at the knots and the mean cycle alternately."""
     interval = np.clip(np.searchsorted(knots, grid, side='right') - 1, 0, knots.size - 2)
     after = (grid - knots[interval]) / (knots[interval + 1] - knots[interval])
     before = 1.0 - after
 
-    def gathered(low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    def accumulate(low: np.ndarray, high: np.ndarray) -> np.ndarray:
         return (np.bincount(interval, low, knots.size)
                 + np.bincount(interval + 1, high, knots.size))
 
     for _ in range(GAUSS_NEWTON_STEPS):
-        left, slope = _model(x, np.interp(grid, knots, phases))
-        stiff, pull = np.einsum('jn,jn->n', slope, slope), np.einsum('jn,jn->n', slope, left)
+        residual, slope = _fit_mean_cycle(x, np.interp(grid, knots, phases))
+        stiff, pull = np.einsum('jn,jn->n', slope, slope), np.einsum('jn,jn->n', slope, residual)
         bands = np.zeros((2, knots.size))
-        bands[1] = gathered(stiff * before**2, stiff * after**2)
+        bands[1] = accumulate(stiff * before**2, stiff * after**2)
         bands[0, 1:] = np.bincount(interval, stiff * before * after, knots.size)[:-1]
         tie = SMOOTHING * bands[1].mean() + 1e-300
         bands[1] += 2.0 * tie
         bands[0, 1:] -= tie
-        step = solveh_banded(bands, gathered(pull * before, pull * after))
+        step = solveh_banded(bands, accumulate(pull * before, pull * after))
         phases = phases + np.clip(step, -MAX_STEP, MAX_STEP)
         if np.abs(step).max() < 1e-5:
             break

@@ -102,13 +102,13 @@ def check_rhythm(frequency: float, phases: np.ndarray, x: np.ndarray, c: np.ndar
 
 def _samples(phases: np.ndarray, x: np.ndarray) -> float:
     """Return the samples of a joint per stride; for bursts, the pauses between them count."""
-    there = np.isfinite(x)
-    own = phases[there[:, int(np.argmax(there.sum(axis=0)))]]
-    steps = np.sort(np.diff(own))
-    passed = np.cumsum(steps)
+    finite = np.isfinite(x)
+    joint_phases = phases[finite[:, int(np.argmax(finite.sum(axis=0)))]]
+    steps = np.sort(np.diff(joint_phases))
+    elapsed = np.cumsum(steps)
     # Half of the time passes between samples that are further apart than this.
-    apart = float(steps[np.searchsorted(passed, 0.5 * passed[-1])])
-    return min(own.size / float(phases[-1] - phases[0]), 1.0 / apart)
+    interval = float(steps[np.searchsorted(elapsed, 0.5 * elapsed[-1])])
+    return min(joint_phases.size / float(phases[-1] - phases[0]), 1.0 / interval)
 
 
 def check_angles(joints: Sequence[str], mean: np.ndarray) -> list[QualityIssue]:
@@ -129,11 +129,11 @@ def check_sway(phases: Mapping[str, float], mean: np.ndarray) -> list[QualityIss
         mean: cycles of the joints, rad, shape (joints, m).
 
     """
-    most = float(np.ptp(mean, axis=1).max())
-    if most >= MAX_SWAY_RANGE or any(abs((phase + 0.5) % 1.0 - 0.5) > IN_PHASE_TOLERANCE
-                                     for phase in phases.values()):
+    largest = float(np.ptp(mean, axis=1).max())
+    if largest >= MAX_SWAY_RANGE or any(abs((phase + 0.5) % 1.0 - 0.5) > IN_PHASE_TOLERANCE
+                                        for phase in phases.values()):
         return []
-    return [QualityIssue(f'all legs move together, by no more than {most:.2g} rad: this also '
+    return [QualityIssue(f'all legs move together, by no more than {largest:.2g} rad: this also '
                          'happens when a standing body sways', 0.3)]
 
 
@@ -165,12 +165,12 @@ def check_change(phases: np.ndarray, x: np.ndarray, legs: Mapping[str, Sequence[
     if not parts or (len(gaits) == 1 and None not in gaits):
         return []
 
-    def moved(leg: str, pair: tuple[int, int]) -> float:
+    def change(leg: str, pair: tuple[int, int]) -> float:
         return abs((parts[pair[1]][leg] - parts[pair[0]][leg] + 0.5) % 1.0 - 0.5)
 
     leg, pair = max(product(parts[0], combinations(range(len(parts)), 2)),
-                    key=lambda couple: moved(*couple))
-    if moved(leg, pair) <= PHASE_CHANGE_THRESHOLD:
+                    key=lambda couple: change(*couple))
+    if change(leg, pair) <= PHASE_CHANGE_THRESHOLD:
         return []
     at = [f'at {parts[k][leg]:.2f} {PART_NAMES[k]}' for k in pair]
     return [QualityIssue(f'the gait changes within the stretch: of a cycle, {leg} is {at[0]} and '
@@ -197,13 +197,13 @@ def _by_parts(phases: np.ndarray, x: np.ndarray, legs: Mapping[str, Sequence[str
 
 def limping(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]) -> list[str]:
     """Return a line for each leg that moves by much less than the others."""
-    size = {leg: float(np.sqrt(sum(np.sum(np.abs(c[name][1:])**2) for name in listed)
-                               / len(listed))) for leg, listed in legs.items()}
+    size = {leg: float(np.sqrt(sum(np.sum(np.abs(c[name][1:])**2) for name in names)
+                               / len(names))) for leg, names in legs.items()}
     limping_legs = []
-    for leg, own in size.items():
+    for leg, motion in size.items():
         usual = float(np.median([other for name, other in size.items() if name != leg]))
-        if own < LIMP_RATIO * usual:
-            limping_legs.append(f'{leg} moves {own / usual:.2f} times as far as the other legs')
+        if motion < LIMP_RATIO * usual:
+            limping_legs.append(f'{leg} moves {motion / usual:.2f} times as far as the other legs')
     return limping_legs
 
 
@@ -250,19 +250,19 @@ def _area(a: np.ndarray, b: np.ndarray) -> float:
 def _without_copies(legs: Sequence[Mapping[str, str]], c: Mapping[str, np.ndarray],
                     roles: Sequence[str]) -> list[str]:
     """Return roles without joints that only copy another one, in a linkage or by duplication."""
-    kept: list[str] = []
+    distinct: list[str] = []
     for role in roles:
         def copies(other: str, role: str = role) -> bool:
-            pairs = [(c[own[other]][1:], c[own[role]][1:]) for own in legs]
+            pairs = [(c[joints[other]][1:], c[joints[role]][1:]) for joints in legs]
             ratios = [float(np.sum(a.conj() * b).real / max(np.sum(np.abs(a)**2), 1e-300))
                       for a, b in pairs]
-            alike = all(np.sum(np.abs(b - ratio * a)**2) < COPY_TOLERANCE**2 * np.sum(np.abs(b)**2)
-                        for ratio, (a, b) in zip(ratios, pairs, strict=True))
-            return alike and (all(abs(abs(ratio) - 1.0) < COPY_TOLERANCE for ratio in ratios)
-                              or bool(JOINT_WORDS & set(other.split()) & set(role.split())))
-        if not any(map(copies, kept)):
-            kept.append(role)
-    return kept
+            copy = all(np.sum(np.abs(b - ratio * a)**2) < COPY_TOLERANCE**2 * np.sum(np.abs(b)**2)
+                       for ratio, (a, b) in zip(ratios, pairs, strict=True))
+            return copy and (all(abs(abs(ratio) - 1.0) < COPY_TOLERANCE for ratio in ratios)
+                             or bool(JOINT_WORDS & set(other.split()) & set(role.split())))
+        if not any(map(copies, distinct)):
+            distinct.append(role)
+    return distinct
 
 
 def _loops(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]
@@ -271,15 +271,15 @@ def _loops(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]
 
     Only joints of all legs are considered; both results are empty if fewer than two move.
     """
-    roles = [{role_of(name): name for name in listed} for listed in legs.values()]
-    power = {role: sum(float(np.sum(np.abs(c[own[role]][1:])**2)) for own in roles)
+    roles = [{role_of(name): name for name in names} for names in legs.values()]
+    power = {role: sum(float(np.sum(np.abs(c[joint_names[role]][1:])**2)) for joint_names in roles)
              for role in sorted(set.intersection(*map(set, roles)))}
-    most = _without_copies(roles, c, sorted(power, key=lambda role: -power[role]))[:2]
-    if len(most) < 2 or power[most[1]] < MIN_MOTION_RATIO**2 * power[most[0]]:
+    strongest = _without_copies(roles, c, sorted(power, key=lambda role: -power[role]))[:2]
+    if len(strongest) < 2 or power[strongest[1]] < MIN_MOTION_RATIO**2 * power[strongest[0]]:
         return {}, set()
-    return ({leg: _area(*(c[own[role]] for role in sorted(most)))
-             for leg, own in zip(legs, roles, strict=True)},
-            {own[role] for own in roles for role in most})
+    return ({leg: _area(*(c[joint_names[role]] for role in sorted(strongest)))
+             for leg, joint_names in zip(legs, roles, strict=True)},
+            {joint_names[role] for joint_names in roles for role in strongest})
 
 
 def check_travel(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray],
@@ -306,7 +306,8 @@ def check_travel(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray],
     for leg, area in loops.items():
         across.setdefault(girdles.get(leg, ''), []).append(area)
     if not joints & set(opposite) and all(
-            min(own) < -CLEAR_LOOP_AREA and max(own) > CLEAR_LOOP_AREA for own in across.values()):
+            min(areas) < -CLEAR_LOOP_AREA and max(areas) > CLEAR_LOOP_AREA
+            for areas in across.values()):
         return [QualityIssue('the legs of one side step forward and those of the other back: it '
                              'turns on the spot', 0.3)]
     return []

@@ -54,8 +54,8 @@ def best_shift(terms: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     start = np.fft.fft(terms, GRID_SIZE).real.argmax(axis=-1) / GRID_SIZE
     theta = start
     for _ in range(NEWTON_ITERATIONS):
-        turned = terms * np.exp(-TWO_PI * 1j * k * theta[..., None])
-        slope, bend = turned.imag @ k, -TWO_PI * (turned.real @ (k * k))
+        shifted_terms = terms * np.exp(-TWO_PI * 1j * k * theta[..., None])
+        slope, bend = shifted_terms.imag @ k, -TWO_PI * (shifted_terms.real @ (k * k))
         peak = bend < 0.0
         theta = np.clip(theta - np.where(peak, slope / np.where(peak, bend, 1.0), 0.0),
                         start - 1.0 / GRID_SIZE, start + 1.0 / GRID_SIZE)
@@ -121,8 +121,8 @@ def steadiness(v: np.ndarray, w: np.ndarray) -> float:
     x, y = v - CENTRES[:, None, None], w - CENTRES[:, None]
     speed = (x * np.roll(y, -1, -1) - y * np.roll(x, -1, -1)) / (x * x + y * y)
     # About a centre outside the curve the sum is 0, and where it turns twice in a cycle 4 pi.
-    once = np.abs(speed.sum(-1) - TWO_PI) < np.pi
-    return float(np.where(once, speed.min(-1), -1.0).max()) * v.size / TWO_PI
+    one_turn = np.abs(speed.sum(-1) - TWO_PI) < np.pi
+    return float(np.where(one_turn, speed.min(-1), -1.0).max()) * v.size / TWO_PI
 
 
 MIN_POINTS = 8
@@ -183,12 +183,12 @@ class _Violations:
         # In a real series every coefficient but the mean counts twice.
         self._weights = np.where(self._n > 0, 2.0, 1.0)[:, None]
         self._power = np.sum(2.0 * np.abs(coefficients[1:]) ** 2)
-        self._known: dict[tuple[str, Fraction], float] = {}
+        self._cache: dict[tuple[str, Fraction], float] = {}
 
     def at(self, element: Permutation, shift: float) -> float:
-        turned = self.coefficients * np.exp(2j * np.pi * self._n * shift)[:, None]
-        apart = np.abs(self.coefficients[:, list(element)] - turned)
-        return float(np.sqrt(np.sum(self._weights * apart * apart) / self._power))
+        target = self.coefficients * np.exp(2j * np.pi * self._n * shift)[:, None]
+        difference = np.abs(self.coefficients[:, list(element)] - target)
+        return float(np.sqrt(np.sum(self._weights * difference * difference) / self._power))
 
     def best(self, element: Permutation) -> tuple[float, float]:
         shift = _best_shift(self.coefficients[:, list(element)], self.coefficients)
@@ -197,9 +197,9 @@ class _Violations:
     def of(self, symmetry: Symmetry) -> float:
         """Return the largest distance over the elements of H."""
         for name, shift in symmetry.shifts:
-            if (name, shift) not in self._known:
-                self._known[name, shift] = self.at(self.elements[name], float(shift))
-        return max(self._known[element] for element in symmetry.shifts)
+            if (name, shift) not in self._cache:
+                self._cache[name, shift] = self.at(self.elements[name], float(shift))
+        return max(self._cache[element] for element in symmetry.shifts)
 
 
 def _check(signals: np.ndarray, group: Group, gaits: Mapping[str, Symmetry], tolerance: float
@@ -212,11 +212,11 @@ def _check(signals: np.ndarray, group: Group, gaits: Mapping[str, Symmetry], tol
     if not np.isfinite(signals).all():
         raise InputError(f'signals holds {np.count_nonzero(~np.isfinite(signals))} values that '
                          'are not finite')
-    spread = signals.std(axis=0)
-    still = np.flatnonzero(spread <= np.maximum(1e-6 * spread.max(),
+    std = signals.std(axis=0)
+    constant = np.flatnonzero(std <= np.maximum(1e-6 * std.max(),
                                                 1e-12 * np.abs(signals).max()))
-    if still.size:
-        raise ValueError(f'channel {still[0] + 1} is constant')
+    if constant.size:
+        raise ValueError(f'channel {constant[0] + 1} is constant')
     if not gaits:
         raise ValueError('gaits is empty')
     for name, gait in gaits.items():
@@ -252,21 +252,21 @@ def recognise(signals: np.ndarray, group: Group, gaits: Mapping[str, Symmetry],
     symmetry = max((candidate for candidate in symmetries(group)
                     if violations.of(candidate) <= tolerance),
                 key=lambda candidate: (len(candidate.h), -violations.of(candidate)))
-    apart = {name: violations.of(gait) for name, gait in gaits.items()}
-    best = min(gaits, key=apart.__getitem__)
-    recognised = apart[best] <= tolerance
+    distances = {name: violations.of(gait) for name, gait in gaits.items()}
+    best = min(gaits, key=distances.__getitem__)
+    matches = distances[best] <= tolerance
     # A gait that includes another has more constraints and fits no better; that is no demerit.
     fitting = [name for name, gait in gaits.items()
-               if (apart[name] <= tolerance if recognised else apart[name] <= apart[best]
+               if (distances[name] <= tolerance if matches else distances[name] <= distances[best]
                    + tolerance and set(gait.shifts) >= set(gaits[best].shifts))]
-    nearest = min(fitting, key=lambda name: (-len(gaits[name].h), apart[name],
+    nearest = min(fitting, key=lambda name: (-len(gaits[name].h), distances[name],
                                              -len(gaits[name].k)))
     others = [name for name, gait in gaits.items()
               if not set(gait.shifts) <= set(gaits[nearest].shifts)]
-    second = min(others, key=apart.__getitem__, default=None)
-    return Recognition(nearest if recognised else None, nearest, apart[nearest],
-                       apart[second] - apart[nearest] if second is not None else np.inf, second,
-                       _phases(cycle, symmetry), symmetry.h, symmetry.k,
+    second = min(others, key=distances.__getitem__, default=None)
+    return Recognition(nearest if matches else None, nearest, distances[nearest],
+                       distances[second] - distances[nearest] if second is not None else np.inf,
+                       second, _phases(cycle, symmetry), symmetry.h, symmetry.k,
                        {name: violations.best(element)
                         for name, element in group.elements.items()})
 

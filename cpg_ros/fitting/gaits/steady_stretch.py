@@ -101,7 +101,7 @@ def resample_evenly(times: np.ndarray, positions: np.ndarray, rate: float
     return grid, signals
 
 
-def _summed(values: np.ndarray) -> np.ndarray:
+def _prefix_sums(values: np.ndarray) -> np.ndarray:
     """Return the sums of the first 0, 1, ... values."""
     return np.concatenate([[0.0], np.cumsum(values)])
 
@@ -117,9 +117,9 @@ def _differences(y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     n = len(y)
     # Joint by joint: all at once take several times the memory.
     columns = (y - y.mean(axis=0)).T
-    squares = _summed(sum(column * column for column in columns))
+    squares = _prefix_sums(sum(column * column for column in columns))
     # Rounding errors of a constant signal are not motion.
-    least = 1e-12 * squares[-1] / n + 1e-300
+    min_variance = 1e-12 * squares[-1] / n + 1e-300
     lags = np.array([lag for lag in LAGS if lag + min(lag, n - lag) >= MIN_CYCLES * lag], int)
     variances: dict[int, np.ndarray] = {}
     differences = np.full((lags.size, n), np.inf)
@@ -127,16 +127,16 @@ def _differences(y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         window = min(lag, n - lag)
         width = min(max(k for k in WINDOW_WIDTHS if k <= lag), window)
         if width not in variances:
-            means = ((sums[width:] - sums[:-width]) / width for sums in map(_summed, columns))
+            means = ((sums[width:] - sums[:-width]) / width for sums in map(_prefix_sums, columns))
             variances[width] = np.maximum((squares[width:] - squares[:-width]) / width
-                                          - sum(mean * mean for mean in means), least)
-        total = _summed(sum((column[lag:] - column[:-lag])**2 for column in columns))
+                                          - sum(mean * mean for mean in means), min_variance)
+        total = _prefix_sums(sum((column[lag:] - column[:-lag])**2 for column in columns))
         count = total.size - window
         inside = np.arange(count) + (window - width) // 2
         # The smaller of both: standing before a step is not like the step.
-        both = np.minimum(variances[width][inside], variances[width][inside + lag])
+        smaller = np.minimum(variances[width][inside], variances[width][inside + lag])
         middle = (lag + window) // 2
-        row[middle:middle + count] = (total[window:] - total[:-window]) / window / (2.0 * both)
+        row[middle:middle + count] = (total[window:] - total[:-window]) / window / (2.0 * smaller)
     variance = np.zeros(n)
     if lags.size:
         width = max(variances)
@@ -160,7 +160,7 @@ def longest_run(mask: np.ndarray) -> tuple[int, int] | None:
     return int(first), int(last)
 
 
-def _best_lag(lags: np.ndarray, differences: np.ndarray, near: np.ndarray
+def _best_lag(lags: np.ndarray, differences: np.ndarray, nearby: np.ndarray
               ) -> tuple[float, float, float] | None:
     """Return the lag among the near ones with the smallest mean difference, that and its median.
 
@@ -169,18 +169,18 @@ def _best_lag(lags: np.ndarray, differences: np.ndarray, near: np.ndarray
     finite = np.isfinite(differences)
     means = np.where(finite, differences, 0.0).sum(axis=1) / np.maximum(finite.sum(axis=1), 1)
     means[~finite.any(axis=1)] = np.inf
-    k = near[np.argmin(means[near])]
+    k = nearby[np.argmin(means[nearby])]
     median = float(np.median(differences[k, finite[k]])) if finite[k].any() else np.inf
     if not 0 < k < lags.size - 1 or not np.isfinite(means[k + 1]):
         return float(lags[k]), float(means[k]), median
-    both = finite[k - 1:k + 2].all(axis=0)
-    before, here, after = differences[k - 1:k + 2, both].mean(axis=1) if both.any() else means[
+    full = finite[k - 1:k + 2].all(axis=0)
+    before, centre, after = differences[k - 1:k + 2, full].mean(axis=1) if full.any() else means[
         k - 1:k + 2]
-    if min(before, after) < here:
+    if min(before, after) < centre:
         return None
-    bend = max(before - 2.0 * here + after, 1e-300)
-    least = max(here - 0.125 * (before - after)**2 / bend, 0.0)
-    return lags[k] + 0.5 * (before - after) / bend, least, median * least / max(here, 1e-300)
+    bend = max(before - 2.0 * centre + after, 1e-300)
+    minimum = max(centre - 0.125 * (before - after)**2 / bend, 0.0)
+    return lags[k] + 0.5 * (before - after) / bend, minimum, median * minimum / max(centre, 1e-300)
 
 
 def find_stretches(times: np.ndarray, y: np.ndarray) -> list[Stretch]:
@@ -196,15 +196,15 @@ def find_stretches(times: np.ndarray, y: np.ndarray) -> list[Stretch]:
     while len(y) >= MIN_CYCLES * MIN_LAG:
         lags, differences, variance = _differences(y)
         for lag in lags[(lags >= MIN_LAG) & (lags < 2 * MIN_LAG)]:
-            near = np.flatnonzero(np.abs(lags - lag) <= LAG_TOLERANCE * lag)
-            for first, last in true_runs(differences[near].min(axis=0) < DIFFERENCE_THRESHOLD):
-                found_lag = _best_lag(lags, differences[:, first:last + 1], near)
+            nearby = np.flatnonzero(np.abs(lags - lag) <= LAG_TOLERANCE * lag)
+            for first, last in true_runs(differences[nearby].min(axis=0) < DIFFERENCE_THRESHOLD):
+                best_lag = _best_lag(lags, differences[:, first:last + 1], nearby)
                 half = 0.5 * min(2 * lag, len(y))
                 begin, end = max(first - half, 0.0), min(last + half, len(y) - 1.0)
-                if found_lag is not None and end - begin >= MIN_CYCLES * found_lag[0]:
+                if best_lag is not None and end - begin >= MIN_CYCLES * best_lag[0]:
                     stretches.append(Stretch(
-                        start + begin * step, start + end * step, found_lag[0] * step,
-                        found_lag[1], found_lag[2],
+                        start + begin * step, start + end * step, best_lag[0] * step,
+                        best_lag[1], best_lag[2],
                         float(np.sqrt(variance[first:last + 1].mean()))))
         half = len(y) // 2
         y = 0.5 * (y[:2 * half:2] + y[1:2 * half:2])

@@ -20,6 +20,7 @@ vary in length (warp), and averaged over that phase (warped).
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from cpg_ros.common.errors import CpgError, InputError, ShortRepr
 from cpg_ros.fitting.gaits.foot_contacts import (
@@ -67,17 +68,13 @@ from cpg_ros.fitting.gaits.steady_stretch import (
     OVERSAMPLING,
     resample_evenly,
 )
+from cpg_ros.fitting.recordings.downsampling import drop_spikes
 from cpg_ros.fitting.recordings.recording import FootLoads, Recording
 from cpg_ros.networks.network import Network
 import numpy as np
 
-# Joints of a recording with enough samples, without spikes.
-
 #: MIN_SAMPLES: of a joint.
 MIN_SAMPLES = 8
-#: SPIKE_RATIO: a sample is a spike if it is off the mean of its neighbours by this many standard
-#: deviations of the joint, and by this multiple of their difference.
-SPIKE_RATIO = 3.0
 
 
 class NoSteadyGait(CpgError):
@@ -98,33 +95,27 @@ def usable_joints(recording: Recording, legs: Mapping[str, Sequence[str]]
         NoSteadyGait: there are too few samples, or a leg has no joint with angles.
 
     """
-    listed = [name for name in recording.joints
-              if any(name in listed_names for listed_names in legs.values())]
+    leg_joints = [name for name in recording.joints
+                  if any(name in listed_names for listed_names in legs.values())]
     # Joint by joint in memory, as they are averaged.
-    x = np.empty((len(listed), len(recording.times))).T
-    for column, name in zip(x.T, listed, strict=True):
+    x = np.empty((len(leg_joints), len(recording.times))).T
+    for column, name in zip(x.T, leg_joints, strict=True):
         column[:] = recording.positions[:, recording.joints.index(name)]
         column[np.isinf(column)] = np.nan
-    enough = np.isfinite(x).sum(axis=0) >= MIN_SAMPLES
+    sufficient = np.isfinite(x).sum(axis=0) >= MIN_SAMPLES
     spikes = 0
-    for k in np.flatnonzero(enough):
-        column = x[:, k]
-        before, here, after = column[:-2], column[1:-1], column[2:]
-        off = np.abs(here - 0.5 * (before + after))
-        with np.errstate(invalid='ignore'):
-            wild = off > SPIKE_RATIO * np.maximum(np.nanstd(column), np.abs(after - before))
-        here[wild] = np.nan
-        spikes += int(np.count_nonzero(wild))
+    for k in np.flatnonzero(sufficient):
+        spikes += drop_spikes(x[:, k])
     # A joint of spikes alone has no samples left.
-    enough = np.isfinite(x).sum(axis=0) >= MIN_SAMPLES
-    names = [name for name, good in zip(listed, enough, strict=True) if good]
-    lost = [name for name in listed if name not in names]
-    notes = [f'left out, without angles: {", ".join(lost)}'] if lost and names else []
+    sufficient = np.isfinite(x).sum(axis=0) >= MIN_SAMPLES
+    names = [name for name, good in zip(leg_joints, sufficient, strict=True) if good]
+    dropped = [name for name in leg_joints if name not in names]
+    notes = [f'left out, without angles: {", ".join(dropped)}'] if dropped and names else []
     if len(recording.times) < MIN_SAMPLES:
         raise NoSteadyGait(f'{recording.source}: {len(recording.times)} samples are not enough '
                            f'for a gait, at least {MIN_SAMPLES} are needed')
-    usable = _kept(legs, names, recording.source)
-    x = x if enough.all() else x[:, enough]
+    usable = _select_joints(legs, names, recording.source)
+    x = x if sufficient.all() else x[:, sufficient]
     if spikes:
         notes.append(f'left out, far off both neighbours: {spikes} samples')
     return usable, x, notes
@@ -148,19 +139,19 @@ def with_angles(names: list[str], legs: dict[str, tuple[str, ...]], x: np.ndarra
     full = np.isfinite(x).sum(axis=0) >= MIN_SAMPLES
     if full.all():
         return names, legs, full
-    lost = [name for name, good in zip(names, full, strict=True) if not good]
-    notes.append(f'left out, without angles in the stretch: {", ".join(lost)}')
-    names = [name for name in names if name not in lost]
-    return names, _kept(legs, names, source), full
+    dropped = [name for name, good in zip(names, full, strict=True) if not good]
+    notes.append(f'left out, without angles in the stretch: {", ".join(dropped)}')
+    names = [name for name in names if name not in dropped]
+    return names, _select_joints(legs, names, source), full
 
 
-def _kept(legs: Mapping[str, Sequence[str]], names: Sequence[str], source: str
+def _select_joints(legs: Mapping[str, Sequence[str]], names: Sequence[str], source: str
           ) -> dict[str, tuple[str, ...]]:
     """Keep the legs' joints that are among names, at least one of each leg."""
-    names_of_leg = {leg: tuple(name for name in listed if name in names) for leg,
-                    listed in legs.items()}
-    for leg, listed in names_of_leg.items():
-        if not listed:
+    names_of_leg = {leg: tuple(name for name in joints if name in names) for leg,
+                    joints in legs.items()}
+    for leg, joints in names_of_leg.items():
+        if not joints:
             raise NoSteadyGait(f'{source}: none of the joints of {leg} '
                                f'({", ".join(legs[leg])}) has angles')
     return names_of_leg
@@ -204,7 +195,7 @@ class Stride(ShortRepr):
         scatter: leg -> how well its phase is known, and kept from stride to stride.
         gait: name, None if none is near enough.
         nearest: the nearest gait.
-        alike: gaits that the recording cannot tell from the nearest, that one among them.
+        candidates: gaits that the recording cannot tell from the nearest, that one among them.
         distance: of the leg phases from the nearest, RMS over legs, cycles.
         margin: how much further the next gait is, cycles.
         confidence: probability that gait and frequency are those named, given the recording.
@@ -229,7 +220,7 @@ class Stride(ShortRepr):
     scatter: dict[str, PhaseScatter]
     gait: str | None
     nearest: str
-    alike: tuple[str, ...]
+    candidates: tuple[str, ...]
     distance: float
     margin: float
     confidence: float
@@ -243,7 +234,8 @@ class Stride(ShortRepr):
         """The gait's name, 'walk or run: cannot tell', or a text on the nearest one."""
         if self.gait is None:
             return f'none of the gaits; nearest {self.nearest}'
-        return self.gait if len(self.alike) < 2 else f'{" or ".join(self.alike)}: cannot tell'
+        return (self.gait if len(self.candidates) < 2
+                else f'{" or ".join(self.candidates)}: cannot tell')
 
     def _summary(self) -> str:
         return (f'{self.verdict}: {self.cycles} cycles of '
@@ -255,7 +247,7 @@ def find_stride(recording: Recording, legs: Legs | Mapping[str, Sequence[str]],
                 network: type[Network] | Network, cells: Mapping[str, int] | None = None,
                 gains: Mapping[str, complex] | None = None,
                 loads: FootLoads | None = None, body: np.ndarray | None = None,
-                known: str = '') -> Stride:
+                gait_name: str = '') -> Stride:
     """Find the steady gait of a recording.
 
     Args:
@@ -271,7 +263,7 @@ def find_stride(recording: Recording, legs: Legs | Mapping[str, Sequence[str]],
             of touchdown, and they tell walk from run where legs move alike in both.
         body: where the body was, m, the last axis upward, shape (n, 3); how it falls tells walk
             from run, too.
-        known: the gait, if it is given: the confidence is then that of the frequency alone.
+        gait_name: the gait, if it is given: the confidence is then that of the frequency alone.
 
     Raises:
         NoSteadyGait: there is none, or none of a leg's joints has angles.
@@ -280,16 +272,69 @@ def find_stride(recording: Recording, legs: Legs | Mapping[str, Sequence[str]],
     """
     kind = network if isinstance(network, type) else type(network)
     source = recording.source
-    own = next(iter(kind.legs.values()))
-    if set(legs) != set(own):
+    leg_cells = next(iter(kind.legs.values()))
+    if set(legs) != set(leg_cells):
         raise InputError(f'{source}: legs are {", ".join(legs)}; the network {kind.name} has '
-                         f'{", ".join(own)}')
-    usable, positions, notes = usable_joints(recording, {leg: legs[leg] for leg in own})
-    times, theta = recording.times, np.arange(POINTS) / POINTS
+                         f'{", ".join(leg_cells)}')
+    cycles = _average_cycles(recording, {leg: legs[leg] for leg in leg_cells})
+    names, usable, warp, average = cycles.names, cycles.legs, cycles.warp, cycles.average
+    c = dict(zip(names, average.coefficients.T, strict=True))
+    # A leg's phase is that of its first cell.
+    leading = {leg: tuple(name for name in leg_joints
+                          if cells is None or cells.get(name) == leg_cells[leg][0]) or leg_joints
+               for leg, leg_joints in usable.items()}
+    ahead, by_legs, vague, opposite = leg_phases(leading, c)
+    contacts = None if loads is None else foot_contacts(
+        loads, leg_cells, float(warp.knots[0]), float(warp.knots[-1]), 1.0 / warp.frequency)
+    leads = None if contacts is None else contacts.leads(warp, tuple(leg_cells))
+    if contacts is not None and leads is not None:
+        # Joints of legs that are built alike move alike, others need not.
+        ahead, vague = leads, ()
+        by_legs = (*by_legs, f"the legs' phases are those of touchdown, by {contacts.source}")
+    body = None if body is None else body[cycles.inside]
+    theta = np.arange(POINTS) / POINTS
+    mean = average.mean(theta)
+    issues = [*_check_cycles(cycles, leading, ahead, vague, mean, kind),
+              *check_travel(usable, c, kind.girdles, opposite, _travel(body, warp))]
+    gait = _decide(match_gait(ahead, kind), kind, (c, cells, gains), contacts,
+                   None if body is None else
+                   falling_fraction(cycles.phases, body[:, 2], warp.frequency), gait_name)
+    if len(gait.candidates) > 1:
+        # The odds of the gait have this already.
+        issues.append(QualityIssue(f'{" or ".join(gait.candidates)}: cannot tell, the legs move '
+                                   'in the same phases; name the gait it is (--gait)', 1.0))
+    return Stride(float(warp.knots[0]), float(warp.knots[-1]), warp.frequency,
+                  warp.frequency_error, int(warp.cycles + 1e-6), tuple(names), theta,
+                  mean, average.spread, average.error, ahead,
+                  phase_scatter(cycles.phases, cycles.x, average, leading, names), gait.gait,
+                  gait.nearest, gait.candidates, gait.distance, gait.margin,
+                  gait.probability * float(np.prod([issue.factor for issue in issues])),
+                  tuple(issue.message for issue in issues if issue.message),
+                  (*cycles.notes, *by_legs, *limping(usable, c), *gait.notes),
+                  replace(warp, phases=warp.phases - average.zero), contacts)
+
+
+class _Cycles(NamedTuple):
+    """Steady part of a recording: its samples, their phases, shape (n,), and mean cycles."""
+
+    names: list[str]
+    legs: dict[str, tuple[str, ...]]
+    inside: slice
+    phases: np.ndarray
+    x: np.ndarray
+    warp: PhaseEstimate
+    average: PhaseAverage
+    notes: list[str]
+
+
+def _average_cycles(recording: Recording, legs: Mapping[str, Sequence[str]]) -> _Cycles:
+    """Find the steady part of a recording of legs' joints, and average its cycles."""
+    times, source = recording.times, recording.source
+    usable, positions, notes = usable_joints(recording, legs)
     names = [name for name in recording.joints
-             if any(name in listed for listed in usable.values())]
-    rough, others = _regions(times, positions, source)
-    notes += others
+             if any(name in leg_joints for leg_joints in usable.values())]
+    rough, region_notes = _regions(times, positions, source)
+    notes += region_notes
     within = index_range(times, rough.begin, rough.end)
     names, usable, full = with_angles(names, usable, positions[within], source, notes)
     positions = positions[:, full]
@@ -299,50 +344,27 @@ def find_stride(recording: Recording, legs: Legs | Mapping[str, Sequence[str]],
     # Strides that differ were left out at the ends of the rough stretch.
     names, usable, full = with_angles(names, usable, x, source, notes)
     x = x[:, full]
-    average = _average(phases, x, theta, [names.index(name) for name in usable[next(iter(own))]],
+    average = _average(phases, x, [names.index(name) for name in usable[next(iter(legs))]],
                        warp.frequency, source)
     notes += quality_notes(warp, average, names)
-    c = dict(zip(names, average.coefficients.T, strict=True))
-    # A leg's phase is that of its first cell.
-    leading = {leg: tuple(name for name in listed
-                          if cells is None or cells.get(name) == own[leg][0]) or listed
-               for leg, listed in usable.items()}
-    ahead, by_legs, vague, opposite = leg_phases(leading, c)
-    contacts = None if loads is None else foot_contacts(
-        loads, own, float(warp.knots[0]), float(warp.knots[-1]), 1.0 / warp.frequency)
-    leads = None if contacts is None else contacts.leads(warp, tuple(own))
-    if contacts is not None and leads is not None:
-        # Joints of legs that are built alike move alike, others need not.
-        ahead, vague = leads, ()
-        by_legs = (*by_legs, f"the legs' phases are those of touchdown, by {contacts.source}")
-    gait, mean = match_gait(ahead, kind), average.mean(theta)
-    issues = [*check_rhythm(warp.frequency, phases, x, average.coefficients),
-              *check_angles(names, mean), *check_legs(vague),
-              *check_sway(ahead, mean),
-              *check_change(phases, x, leading, names, lambda part: match_gait(part, kind).gait),
-              *check_travel(usable, c, kind.girdles, opposite, _travel(body, inside, warp))]
-    if warp.cycles < RELIABLE_CYCLES:
-        issues.append(QualityIssue('', FEW_CYCLES_FACTOR))
-    gait = _decide(gait, kind, (c, cells, gains), contacts, None if body is None else
-                   falling_fraction(phases, body[inside][:, 2], warp.frequency), known)
-    if len(gait.alike) > 1:
-        # The odds of the gait have this already.
-        issues.append(QualityIssue(f'{" or ".join(gait.alike)}: cannot tell, the legs move in the '
-                                   'same phases; name the gait it is (--gait)', 1.0))
-    return Stride(float(warp.knots[0]), float(warp.knots[-1]), warp.frequency,
-                  warp.frequency_error, int(warp.cycles + 1e-6), tuple(names), theta,
-                  mean, average.spread, average.error, ahead,
-                  phase_scatter(phases, x, average, leading, names), gait.gait,
-                  gait.nearest, gait.alike, gait.distance, gait.margin,
-                  gait.probability * float(np.prod([issue.factor for issue in issues])),
-                  tuple(issue.message for issue in issues if issue.message),
-                  (*notes, *by_legs, *limping(usable, c), *gait.notes),
-                  replace(warp, phases=warp.phases - average.zero), contacts)
+    return _Cycles(names, usable, inside, phases, x, warp, average, notes)
+
+
+def _check_cycles(cycles: _Cycles, leading: Mapping[str, Sequence[str]],
+                  ahead: Mapping[str, float], vague: Sequence[str], mean: np.ndarray,
+                  kind: type[Network]) -> list[QualityIssue]:
+    """Return issues of rhythm, angles and legs' phases; few cycles are one without a message."""
+    phases, x, warp = cycles.phases, cycles.x, cycles.warp
+    few = [] if warp.cycles >= RELIABLE_CYCLES else [QualityIssue('', FEW_CYCLES_FACTOR)]
+    return [*check_rhythm(warp.frequency, phases, x, cycles.average.coefficients),
+            *check_angles(cycles.names, mean), *check_legs(vague), *check_sway(ahead, mean),
+            *check_change(phases, x, leading, cycles.names,
+                          lambda part: match_gait(part, kind).gait), *few]
 
 
 def _decide(gait: GaitMatch, kind: type[Network], signals: tuple[
         dict[str, np.ndarray], Mapping[str, int] | None, Mapping[str, complex] | None],
-        contacts: FootContacts | None, falls: float | None, known: str) -> GaitMatch:
+        contacts: FootContacts | None, falls: float | None, gait_name: str) -> GaitMatch:
     """Decide between gaits that move the legs alike.
 
     Args:
@@ -351,20 +373,20 @@ def _decide(gait: GaitMatch, kind: type[Network], signals: tuple[
         signals: harmonics of the joints, and cells and gains as of find_stride.
         contacts: of the feet.
         falls: fraction of the stride in which the body falls freely.
-        known: the gait, if it is given.
+        gait_name: the gait, if it is given.
 
     """
     coefficients, cells, gains = signals
-    if cells is not None and gains is not None and len(gait.alike) > 1:
+    if cells is not None and gains is not None and len(gait.candidates) > 1:
         by_cells = _cell_signals(coefficients, cells, gains, kind)
         if by_cells is not None:
             gait = match_gait_by_cells(by_cells, kind)
     gait = walk_or_run(gait, contacts, falls)
-    if not known:
+    if not gait_name:
         return gait
     gait = replace(gait, probability=1.0)
-    return (replace(gait, gait=known, nearest=known, alike=(known,)) if known in gait.alike
-            else gait)
+    return (replace(gait, gait=gait_name, nearest=gait_name, candidates=(gait_name,))
+            if gait_name in gait.candidates else gait)
 
 
 def _phase(times: np.ndarray, x: np.ndarray, rough: RoughPhase, source: str) -> PhaseEstimate:
@@ -378,26 +400,26 @@ def _phase(times: np.ndarray, x: np.ndarray, rough: RoughPhase, source: str) -> 
     return warp
 
 
-def _average(phases: np.ndarray, x: np.ndarray, theta: np.ndarray, leading: list[int],
-             frequency: float, source: str) -> PhaseAverage:
+def _average(phases: np.ndarray, x: np.ndarray, leading: list[int], frequency: float, source: str
+             ) -> PhaseAverage:
     """Return the mean cycle, if it explains enough of the motion."""
     try:
-        average = average_cycles(phases, x, theta, leading)
+        average = average_cycles(phases, x, np.arange(POINTS) / POINTS, leading)
     except InputError as error:
         raise NoSteadyGait(f'{source}: {error}') from error
     power = np.array([np.nanvar(column) for column in x.T])
-    left = float(np.sum(average.left * power) / np.sum(power))
-    if left > MAX_RESIDUAL_VARIANCE:
+    residual = float(np.sum(average.residual * power) / np.sum(power))
+    if residual > MAX_RESIDUAL_VARIANCE:
         raise NoSteadyGait(f'{source}: no steady gait: the mean cycle, of {1.0 / frequency:.3g} s,'
-                           f' leaves {100.0 * left:.0f} % of the variance')
+                           f' leaves {100.0 * residual:.0f} % of the variance')
     return average
 
 
-def _travel(body: np.ndarray | None, inside: slice, warp: PhaseEstimate) -> float:
+def _travel(body: np.ndarray | None, warp: PhaseEstimate) -> float:
     """Return by how much the body goes on in a stride, m, 0 if that is not known."""
     if body is None:
         return 0.0
-    return float(np.linalg.norm(np.ptp(body[inside][:, :2], axis=0)) / warp.cycles)
+    return float(np.linalg.norm(np.ptp(body[:, :2], axis=0)) / warp.cycles)
 
 
 def _regions(times: np.ndarray, x: np.ndarray, source: str) -> tuple[RoughPhase, list[str]]:
@@ -445,9 +467,9 @@ def _hint(times: np.ndarray, x: np.ndarray, reach: np.ndarray) -> str:
     if reach.max() > MAX_JOINT_RANGE:
         return ': if the angles are in degrees, declare it (--unit deg)'
     # Half a stride is at least as long as the slowest joint takes from its least to its largest.
-    there = [np.flatnonzero(np.isfinite(column)) for column in x.T]
-    half = max(abs(float(times[own[np.argmax(column[own])]] - times[own[np.argmin(column[own])]]))
-               for own, column in zip(there, x.T, strict=True))
+    indices = [np.flatnonzero(np.isfinite(column)) for column in x.T]
+    half = max(abs(float(times[at[np.argmax(column[at])]] - times[at[np.argmin(column[at])]]))
+               for at, column in zip(indices, x.T, strict=True))
     if times[-1] > 2.0 * MIN_CYCLES * half:
         return ''
     return (f': it lasts {times[-1]:.3g} s, which may be a single stride: record '

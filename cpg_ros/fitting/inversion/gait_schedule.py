@@ -138,7 +138,7 @@ class StretchFit(ShortRepr):
     @property
     def gait(self) -> str | None:
         """Name of the gait, None if it is not a gait of the network or undecided."""
-        return None if len(self.stride.alike) > 1 else self.stride.gait
+        return None if len(self.stride.candidates) > 1 else self.stride.gait
 
 
     @property

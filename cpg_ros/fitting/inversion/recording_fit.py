@@ -211,8 +211,8 @@ class RecordingFit(ShortRepr):
         rms, fraction = fit.rms, fit.rms_share
         verdict = fit.verdict
         return {
-            'gait': fit.gait, 'recognised': stride.gait if len(stride.alike) < 2 else None,
-            'nearest': stride.nearest, 'alike': list(stride.alike),
+            'gait': fit.gait, 'recognised': stride.gait if len(stride.candidates) < 2 else None,
+            'nearest': stride.nearest, 'alike': list(stride.candidates),
             'distance': stride.distance, 'margin': stride.margin, 'confidence': self.confidence,
             'frequency': stride.frequency, 'frequency_error': stride.frequency_error,
             'cycles': stride.cycles, 'begin': stride.begin, 'end': stride.end,

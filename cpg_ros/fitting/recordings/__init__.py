@@ -15,6 +15,7 @@
 """Recorded and live joint states: bags, laboratory files, messages as bytes."""
 
 __all__ = ['bag_library', 'bag_reader', 'bag_storage', 'bag_writer', 'bvh_reader', 'c3d_reader',
-           'cdr', 'csv_reader', 'formats', 'joint_streams', 'low_state', 'markers', 'npz_reader',
+           'cdr', 'csv_reader', 'downsampling', 'formats', 'joint_streams', 'low_state',
+           'markers', 'npz_reader',
            'opensim_reader', 'pose_reader', 'reader_process', 'recording', 'rosbag2_library',
-           'rosbags_library', 'tables', 'thinned']
+           'rosbags_library', 'tables']

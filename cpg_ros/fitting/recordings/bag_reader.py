@@ -26,7 +26,7 @@ import struct
 
 from cpg_ros.common.command_line import printable, progress_bar
 from cpg_ros.fitting.recordings.bag_storage import Bag, ENDINGS, files_of_bag, opened
-from cpg_ros.fitting.recordings.joint_streams import BATCH_SIZE, recorded, Servo, Stream
+from cpg_ros.fitting.recordings.joint_streams import BATCH_SIZE, merge_streams, Servo, Stream
 from cpg_ros.fitting.recordings.recording import (
     FootLoads,
     JOINTS,
@@ -52,14 +52,14 @@ class LoadStream:
 
     def __init__(self, topic: str) -> None:
         self.topic = topic
-        self._received: list[int] = []
+        self._receive_times: list[int] = []
         self._messages: list[bytes] = []
         #: Time of reception and stamp of each joint state, ns.
         self._clock: list[tuple[int, int]] = []
 
     def add(self, received: int, message: bytes) -> None:
         """Add a serialised message, received at a time in ns."""
-        self._received.append(received)
+        self._receive_times.append(received)
         self._messages.append(bytes(message))
 
     def pass_joint_state(self, received: int, message: bytes) -> None:
@@ -83,10 +83,10 @@ class LoadStream:
         first = self._messages[0]
         try:
             legs, offset = _layout(first)
-            whole = {len(message) for message in self._messages} == {len(first)}
+            same_size = {len(message) for message in self._messages} == {len(first)}
         except (struct.error, UnicodeDecodeError, ValueError):
-            whole = False
-        if not whole or offset + 8 * len(legs) > len(first):
+            same_size = False
+        if not same_size or offset + 8 * len(legs) > len(first):
             raise RecordingError(f'{self.topic}: foot loads need a label with the names of the '
                                  'legs, and a number for each')
         body = b''.join(message[offset:offset + 8 * len(legs)] for message in self._messages)
@@ -100,9 +100,9 @@ class LoadStream:
         if abs(start - 1e-9 * stamps[0]) > CLOCK_TOLERANCE:
             # Joint states without stamps are recorded by when they were received.
             stamps = received
-        begin, own = received[0], np.array(self._received, dtype=np.int64)
+        begin, times = received[0], np.array(self._receive_times, dtype=np.int64)
         # Interpolate differences: floats hold these to the nanosecond, unlike times since 1970.
-        return np.asarray(1e-9 * np.interp(own - begin, received - begin, stamps - stamps[0])
+        return np.asarray(1e-9 * np.interp(times - begin, received - begin, stamps - stamps[0])
                           + (1e-9 * float(stamps[0]) - start))
 
 
@@ -171,22 +171,22 @@ def read_bag(path: str | Path, topics: Sequence[str] = (), joints: Sequence[str]
         total = max(1, sum(expected[topic] for topic in streams))
         with progress_bar(f'reading {path.name}', total, enabled=progress) as bar:
             messages = bag.messages([*streams, *([loads.topic] if loads else [])])
-            for done, (topic, received, message) in enumerate(messages, 1):
+            for count, (topic, received, message) in enumerate(messages, 1):
                 if loads and topic == loads.topic:
                     loads.add(received, message)
                     continue
                 streams[topic].add(received, message)
                 if loads:
                     loads.pass_joint_state(received, message)
-                if not done % BATCH_SIZE:
-                    bar(done)
+                if not count % BATCH_SIZE:
+                    bar(count)
         for stream in streams.values():
             stream.decode()
         notes = [*map(printable, bag.notes), *(
             f"{topic}: {stream.count} messages, where the bag's metadata counts {expected[topic]}"
             for topic, stream in streams.items() if stream.count != expected[topic]), *(
             f'{topic}: no messages' for topic, stream in streams.items() if not stream.count)]
-    recording = recorded(list(streams.values()), joints, source, notes, some)
+    recording = merge_streams(list(streams.values()), joints, source, notes, some)
     return recording if loads is None else _with_loads(recording, loads)
 
 

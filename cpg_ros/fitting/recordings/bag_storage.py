@@ -125,7 +125,7 @@ class Bag:
         self.connections = [connection for reader in readers for connection in reader.connections]
         # The library refuses unordered messages in files without an index; those of a single
         # topic mostly are in order.
-        self.apart = cut
+        self.damaged = cut
         for connection in self.connections:
             for value, kind in ((connection.topic, str), (connection.msgtype, str),
                                 (connection.msgcount, int)):
@@ -148,22 +148,23 @@ class Bag:
             counts = self.expected()
             return [max(motors, key=lambda topic: counts[topic])]
         if not topics and not fitting:
-            there = ', '.join(f'{topic} ({", ".join(sorted(types[topic]))})'
-                              for topic in list(types)[:6])
-            raise RecordingError(f'{self.path}: no topic of type {JOINT_STATE}; it has {there}')
-        resolved = []
+            available = ', '.join(f'{topic} ({", ".join(sorted(types[topic]))})'
+                                  for topic in list(types)[:6])
+            raise RecordingError(f'{self.path}: no topic of type {JOINT_STATE}; it has '
+                                 f'{available}')
+        full_names = []
         for topic in topics:
             name = topic if topic in types else '/' + topic.strip('/')
-            resolved += [name] if name in types else [
+            full_names += [name] if name in types else [
                 name_of for name_of in fitting if name_of.startswith(f'{name}/')] or [name]
-        for topic in resolved:
+        for topic in full_names:
             if topic not in types:
                 raise RecordingError(f'{self.path}: no topic {topic!r}; '
                                      f'there are {abbreviate(list(types), 20)}')
             if topic not in (*fitting, *motors):
                 raise RecordingError(f'{self.path}, {topic}: {" and ".join(sorted(types[topic]))}'
                                      f', where {JOINT_STATE} is needed')
-        return list(dict.fromkeys(resolved)) or fitting
+        return list(dict.fromkeys(full_names)) or fitting
 
     def kind(self, topic: str) -> str:
         """Return the type of a topic."""
@@ -183,7 +184,7 @@ class Bag:
         unpacked = UnpackedSize(self.size)
         for reader in self.readers:
             connections = [item for item in reader.connections if item.topic in topics]
-            for some in [[item] for item in connections] if self.apart else (
+            for some in [[item] for item in connections] if self.damaged else (
                     [connections] * bool(connections)):
                 try:
                     for connection, received, message in reader.messages(some):
@@ -235,22 +236,22 @@ def _opened(path: Path) -> Iterator[Bag]:
                 size += file.stat().st_size
         notes = [f'{file}: its recorder did not finish it; what is whole before byte {end} is used'
                  for file in files if (end := whole_part(file)) is not None]
-        whole = path.is_file() or (path / METADATA_FILE).exists()
-        renamed = _renamed(path, files) if path.is_dir() and whole else ''
+        complete = path.is_file() or (path / METADATA_FILE).exists()
+        rename_note = _renamed(path, files) if path.is_dir() and complete else ''
     except OSError as error:
         raise RecordingError(f'{error.filename or path}: {error.strerror}') from error
-    cut = bool(notes)
-    if not whole:
+    damaged = bool(notes)
+    if not complete:
         notes.append(f'{path}: metadata.yaml is missing; its storage files are read as they are')
-    if renamed:
-        whole = False
-        notes.append(f'{path / METADATA_FILE} names {renamed}, which is not there; its storage '
+    if rename_note:
+        complete = False
+        notes.append(f'{path / METADATA_FILE} names {rename_note}, which is missing; its storage '
                      'files are read as they are')
     with ExitStack() as stack:
         readers = []
-        for storage in [path] if whole else files:
+        for storage in [path] if complete else files:
             try:
-                reader = Reader(UnfinishedPath(storage) if cut else storage)
+                reader = Reader(UnfinishedPath(storage) if damaged else storage)
                 reader.open()
             # The library names no complete list of what a damaged bag makes it raise.
             except Exception as error:
@@ -258,7 +259,7 @@ def _opened(path: Path) -> Iterator[Bag]:
                     f'{_culprit(storage, files, error)}: {line(error)}') from error
             stack.callback(reader.close)
             readers.append(reader)
-        yield Bag(path, readers, cut, notes, size)
+        yield Bag(path, readers, damaged, notes, size)
 
 
 def _renamed(path: Path, files: list[Path]) -> str:
@@ -266,10 +267,10 @@ def _renamed(path: Path, files: list[Path]) -> str:
     text = (path / METADATA_FILE).read_text(errors='replace')[:MAX_METADATA_SIZE]
     part = re.search(r'^  relative_file_paths:\n((?: +- .*\n)+)', text, re.M)
     names = [] if part is None else [line.strip(' -"\'') for line in part[1].splitlines()]
-    there = {file.name for file in files}
-    matched = len(names) == len(files) > 0 and not any(
-        name.endswith(ZSTD_SUFFIX) or Path(name).name in there for name in names)
-    return abbreviate(names, 3) if matched else ''
+    names_on_disk = {file.name for file in files}
+    same_files = len(names) == len(files) > 0 and not any(
+        name.endswith(ZSTD_SUFFIX) or Path(name).name in names_on_disk for name in names)
+    return abbreviate(names, 3) if same_files else ''
 
 
 def _check(file: Path) -> None:

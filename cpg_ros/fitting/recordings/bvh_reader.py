@@ -24,6 +24,7 @@ import math
 from pathlib import Path
 import re
 
+from cpg_ros.fitting.recordings.downsampling import MAX_POSITION, pluralize
 from cpg_ros.fitting.recordings.recording import (
     abbreviate,
     matching,
@@ -32,10 +33,9 @@ from cpg_ros.fitting.recordings.recording import (
     RecordingError,
     RecordingFormat,
     require,
-    unwrapped,
+    unwrap,
 )
 from cpg_ros.fitting.recordings.tables import number_in, number_rows, opened, remaining_lines
-from cpg_ros.fitting.recordings.thinned import MAX_POSITION, pluralize
 import numpy as np
 
 CHANNELS = {f'{axis}{kind}' for axis in 'XYZ' for kind in ('rotation', 'position', 'scale')}
@@ -82,13 +82,13 @@ def read_bvh(path: str | Path, joints: Sequence[str] = (), progress: bool = True
         angles[~(np.abs(angles) <= MAX_POSITION)] = np.nan
         moving = [name for name, column in zip(names, angles.T, strict=True)
                   if not (column == column[0]).all()]
-    selected = matching(joints, names, str(path)) if joints else moving
-    if not selected:
+    joint_names = matching(joints, names, str(path)) if joints else moving
+    if not joint_names:
         raise RecordingError(f'{path}: no joint moves in {pluralize(len(rows), "frame")}')
     if not joints and len(moving) < len(names):
         notes.append(f'{pluralize(len(names) - len(moving), "channel")} left out: no motion')
     stamps = np.rint(np.arange(len(rows)) * interval * 1e9).astype(np.int64)
-    return recording_of(path, stamps, names, unwrapped(angles), notes, selected)
+    return recording_of(path, stamps, names, unwrap(angles), notes, joint_names)
 
 
 def _tree(text: str, path: Path) -> list[tuple[str, str]]:
@@ -101,12 +101,12 @@ def _tree(text: str, path: Path) -> list[tuple[str, str]]:
             if not joint:
                 raise RecordingError(f'{path}: a {kind} without a name')
             continue
-        count, *named = value.split() or ['']
-        if count != str(len(named)) or not set(named) <= CHANNELS or not joint:
+        count, *names = value.split() or ['']
+        if count != str(len(names)) or not set(names) <= CHANNELS or not joint:
             raise RecordingError(f'{path}: the channels of {joint or "nothing"!r}, '
-                                 f'{abbreviate([count, *named])}, are no number and as many '
+                                 f'{abbreviate([count, *names])}, are no number and as many '
                                  'names such as Xrotation')
-        channels += [(joint, channel) for channel in named]
+        channels += [(joint, channel) for channel in names]
     if text.count('{') != text.count('}'):
         raise RecordingError(f'{path}: not as many braces close as open in its tree of joints')
     if len(channels) > MAX_CHANNELS or not any(channel.endswith('rotation')

@@ -26,6 +26,7 @@ from typing import Any
 
 from cpg_ros.common import files
 from cpg_ros.common.errors import needed
+from cpg_ros.fitting.recordings.downsampling import pluralize
 from cpg_ros.fitting.recordings.markers import (
     contacts,
     Footfall,
@@ -37,7 +38,7 @@ from cpg_ros.fitting.recordings.markers import (
     SEGMENTS,
     travelling,
 )
-from cpg_ros.fitting.recordings.reader_process import read_apart, UnreadableFile
+from cpg_ros.fitting.recordings.reader_process import read_in_process, UnreadableFile
 from cpg_ros.fitting.recordings.recording import (
     abbreviate,
     ANGLE_UNITS,
@@ -46,10 +47,9 @@ from cpg_ros.fitting.recordings.recording import (
     Recording,
     RecordingError,
     RecordingFormat,
-    unwrapped,
+    unwrap,
 )
 from cpg_ros.fitting.recordings.tables import stamps_of_frames
-from cpg_ros.fitting.recordings.thinned import pluralize
 import numpy as np
 
 #: MAX_SIZE: of a file, bytes; BLOCK_SIZE: of its first block, bytes.
@@ -78,15 +78,15 @@ def read_c3d(path: str | Path, segments: str | Path | None = None, joints: Seque
 
     """
     markers, angles, unit, events, plates = _contents(Path(path))
-    recording = (_modelled(markers, angles, unit, joints) if segments is None and angles else
+    recording = (_model_angles(markers, angles, unit, joints) if segments is None and angles else
                  joint_recording(markers, segments, joints))
     body = load_segments(PLUG_IN_GAIT if segments is None else segments).named_as(markers.names)
     feet = {leg: markers.points[:, [markers.names.index(name) for name in names]].mean(axis=1)
             for leg, names in body.feet.items() if set(names) <= set(markers.names)}
-    for found, source in ((footfalls(events), "the file's events"),
-                          (plate_footfalls(1e-9 * markers.stamps, *plates, feet),
-                           'the force plates')):
-        if (loads := contacts(found, recording.start, recording.times)) is not None:
+    for candidate, source in ((footfalls(events), "the file's events"),
+                              (plate_footfalls(1e-9 * markers.stamps, *plates, feet),
+                               'the force plates')):
+        if (loads := contacts(candidate, recording.start, recording.times)) is not None:
             return replace(recording, loads=loads, notes=(
                 *recording.notes, f'which foot is on the ground is taken from {source}'))
     return recording
@@ -99,10 +99,10 @@ def _point(parameters: Any, first: int) -> dict[str, Any]:
         key: [value if isinstance(value, str) else float(value) for value in entry['value']]
         for key, entry in parameters['POINT'].items() if key.startswith(keys)}
     if 'EVENT' in parameters:
-        known = {key: parameters['EVENT'][key]['value'] for key in ('LABELS', 'CONTEXTS', 'TIMES')
-                 if key in parameters['EVENT']}
-        minutes, seconds = np.asarray(known.pop('TIMES', np.zeros((2, 0)))).reshape(2, -1)
-        result['EVENT'] = {**known, 'TIMES': (60.0 * minutes + seconds
+        values = {key: parameters['EVENT'][key]['value'] for key in ('LABELS', 'CONTEXTS', 'TIMES')
+                  if key in parameters['EVENT']}
+        minutes, seconds = np.asarray(values.pop('TIMES', np.zeros((2, 0)))).reshape(2, -1)
+        result['EVENT'] = {**values, 'TIMES': (60.0 * minutes + seconds
                                              - first / result['RATE'][0]).tolist()}
     return result
 
@@ -128,11 +128,11 @@ def _plates(parameters: Any, analogs: np.ndarray, frames: int) -> tuple[np.ndarr
     loads, corners = [], []
     with suppress(LookupError, TypeError, ValueError):
         for k, kind in enumerate(parameters['TYPE']['value']):
-            own = np.asarray(parameters['CHANNEL']['value'], int).T[k] - 1
+            columns = np.asarray(parameters['CHANNEL']['value'], int).T[k] - 1
             weights: Any = 1.0
-            vertical = own[4:8] if kind == 3 else own[2:3]
+            vertical = columns[4:8] if kind == 3 else columns[2:3]
             if kind == 4:
-                vertical, weights = own[:6], np.asarray(
+                vertical, weights = columns[:6], np.asarray(
                     parameters['CAL_MATRIX']['value'])[2, :6, k, None]
             force = np.sum(weights * analogs[vertical], axis=0)
             loads.append(force.reshape(frames, -1).mean(axis=1))
@@ -201,8 +201,8 @@ def plate_footfalls(times: np.ndarray, loads: np.ndarray, corners: np.ndarray,
         above.append(np.where(inside.all(axis=1),
                               np.abs(np.einsum('pnx,px->pn', along, upward)), np.inf))
     width, stances = np.ones(max(1, round(MIN_DURATION / float(np.median(np.diff(times)))))), []
-    for leg, own, other in zip(feet, above, above[::-1], strict=True):
-        down = ((np.abs(loads) > CONTACT_FORCE) & (own < other)).any(axis=0)
+    for leg, load, other in zip(feet, above, above[::-1], strict=True):
+        down = ((np.abs(loads) > CONTACT_FORCE) & (load < other)).any(axis=0)
         down = binary_opening(binary_closing(down, width), width)
         changes = (np.flatnonzero(np.diff(down)) + 1)[int(down[0]):]
         stances += [(float(times[first]), leg, float(times[end]))
@@ -237,16 +237,16 @@ def c3d_markers(path: str | Path) -> Markers:
 def _contents(path: Path) -> tuple[Markers, list[str], str, Mapping[str, Any],
                                    tuple[np.ndarray, np.ndarray]]:
     """Return points, names of angles, their unit, '' if none, events, and what plates measured."""
-    stated = _stated(path)
+    num_frames = _num_frames(path)
     needed('ezc3d')
     try:
-        arrays = read_apart(c3d_arrays, path)
+        arrays = read_in_process(c3d_arrays, path)
         point, points, residuals = (json.loads(str(arrays['point'])), arrays['points'],
                                     arrays['residuals'])
         rate = float(point['RATE'][0])
     except (UnreadableFile, LookupError, TypeError, ValueError, OSError) as error:
-        why = ' '.join(str(error).split()).rstrip('.') or type(error).__name__
-        raise RecordingError(f'{path}: not a readable C3D file: {why[:200]}') from error
+        reason = ' '.join(str(error).split()).rstrip('.') or type(error).__name__
+        raise RecordingError(f'{path}: not a readable C3D file: {reason[:200]}') from error
     labels, angles = (_names(point, key) for key in ('LABELS', 'ANGLES'))
     units = [str(unit) for unit in point.get('ANGLE_UNITS', [])]
     count, frames = points.shape[1:]
@@ -257,8 +257,8 @@ def _contents(path: Path) -> tuple[Markers, list[str], str, Mapping[str, Any],
     if len(labels) != count:
         raise RecordingError(f'{path}: {len(labels)} labels for {pluralize(count, "point")}')
     coordinates = np.where(residuals < 0.0, np.nan, points[:3]).transpose(2, 1, 0)
-    notes = ([f'{pluralize(frames, "frame")}, where the header states {stated}: it may be cut']
-             if frames < stated else [])
+    notes = ([f'{pluralize(frames, "frame")}, where the header states {num_frames}: it may be cut']
+             if frames < num_frames else [])
     names, doubles = marker_names(labels, coordinates)
     markers = Markers(names, stamps_of_frames(np.arange(frames), rate, path), coordinates, path,
                     notes=(*notes, *doubles),
@@ -277,7 +277,7 @@ def _names(point: Mapping[str, Any], key: str) -> list[str]:
     return [str(name).strip() for parameter in keys for name in point[parameter]]
 
 
-def _modelled(points: Markers, angles: Sequence[str], unit: str, joints: Sequence[str]
+def _model_angles(points: Markers, angles: Sequence[str], unit: str, joints: Sequence[str]
               ) -> Recording:
     """Return the angles that a model wrote."""
     source = points.source
@@ -288,21 +288,21 @@ def _modelled(points: Markers, angles: Sequence[str], unit: str, joints: Sequenc
     coordinates = points.points[:, [points.names.index(name) for name in names]]
     # Some programs write zeros where a model had no value.
     first = np.where((coordinates == 0.0).all(axis=2), np.nan, scale * coordinates[..., 0])
-    silent = [name for k, name in enumerate(names) if not np.isfinite(first[:, k]).any()]
-    if silent and (joints or len(silent) == len(names)):
-        raise RecordingError(f'{source}: no value of {abbreviate(silent)}')
-    indices = [k for k, name in enumerate(names) if name not in silent]
+    empty = [name for k, name in enumerate(names) if not np.isfinite(first[:, k]).any()]
+    if empty and (joints or len(empty) == len(names)):
+        raise RecordingError(f'{source}: no value of {abbreviate(empty)}')
+    indices = [k for k, name in enumerate(names) if name not in empty]
     notes = [*points.notes, 'of each angle the first component is taken, flexion in Plug-in Gait']
     if not unit:
         notes.append('no POINT:ANGLE_UNITS: angles are taken to be in degrees')
-    if silent:
-        notes.append(f'without a value, left out: {abbreviate(silent)}')
-    return travelling(source, [names[k] for k in indices], unwrapped(first[:, indices]), notes,
+    if empty:
+        notes.append(f'without a value, left out: {abbreviate(empty)}')
+    return travelling(source, [names[k] for k in indices], unwrap(first[:, indices]), notes,
                       load_segments(PLUG_IN_GAIT).named_as(points.names), points,
                       points.points)
 
 
-def _stated(path: Path) -> int:
+def _num_frames(path: Path) -> int:
     """Return the number of frames that a file's first block states, mod 65536.
 
     Raises:

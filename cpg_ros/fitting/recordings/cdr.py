@@ -80,26 +80,26 @@ def decode(messages: Sequence[bytes], efforts: bool = False) -> Iterator[Seriali
 
     """
     fields = FIELDS if efforts else FIELDS[:1]
-    left = np.arange(len(messages))
+    pending = np.arange(len(messages))
     lengths = np.fromiter(map(len, messages), np.intp, len(messages))
     for _ in range(MAX_LAYOUTS):
-        if not left.size:
+        if not pending.size:
             return
-        layout = _Layout(messages, int(left[0]))
-        alike = lengths[left] == layout.length
-        same = left[alike]
-        joined = b''.join(messages if len(same) == len(messages) else
-                          [messages[k] for k in same])
-        fits = layout.fits(joined)
-        stamps, numbers = layout.read(joined, fields)
+        layout = _Layout(messages, int(pending[0]))
+        same_length = lengths[pending] == layout.length
+        rows = pending[same_length]
+        data = b''.join(messages if len(rows) == len(messages) else
+                        [messages[k] for k in rows])
+        fits = layout.fits(data)
+        stamps, numbers = layout.read(data, fields)
         if fits.all():
-            left = left[~alike]
+            pending = pending[~same_length]
         else:
-            same, stamps, numbers = same[fits], stamps[fits], [array[fits] for array in numbers]
-            left = np.setdiff1d(left, same, assume_unique=True)
-        yield SerializedBlock(same, stamps, layout.names, *numbers)
-    for k in left.tolist():
-        message = _decoded(messages, k)
+            rows, stamps, numbers = rows[fits], stamps[fits], [array[fits] for array in numbers]
+            pending = np.setdiff1d(pending, rows, assume_unique=True)
+        yield SerializedBlock(rows, stamps, layout.names, *numbers)
+    for k in pending.tolist():
+        message = _decode_one(messages, k)
         stamp = message.header.stamp
         yield SerializedBlock(np.array([k]), np.array([stamp.sec * 10**9 + stamp.nanosec]),
                               tuple(message.name), *(
@@ -112,22 +112,22 @@ def in_order(blocks: Iterable[SerializedBlock]) -> Iterator[SerializedBlock]:
 
     Such blocks can differ in byte order, or in the frame's name.
     """
-    alike: dict[tuple, list[SerializedBlock]] = {}
+    groups: dict[tuple, list[SerializedBlock]] = {}
     for block in blocks:
         widths = (array.shape[1] for array in (block.positions, block.velocities, block.efforts))
-        alike.setdefault((block.names, *widths), []).append(block)
-    for same in alike.values():
-        if len(same) == 1:
-            yield same[0]
+        groups.setdefault((block.names, *widths), []).append(block)
+    for group in groups.values():
+        if len(group) == 1:
+            yield group[0]
             continue
-        order = np.argsort(np.concatenate([block.rows for block in same]))
-        rows, stamps, *numbers = (np.concatenate([getattr(block, name) for block in same])[order]
+        order = np.argsort(np.concatenate([block.rows for block in group]))
+        rows, stamps, *numbers = (np.concatenate([getattr(block, name) for block in group])[order]
                                   for name in ('rows', 'stamps', 'positions', 'velocities',
                                                'efforts'))
-        yield SerializedBlock(rows, stamps, same[0].names, *numbers)
+        yield SerializedBlock(rows, stamps, group[0].names, *numbers)
 
 
-def _decoded(messages: Sequence[bytes], index: int) -> Any:
+def _decode_one(messages: Sequence[bytes], index: int) -> Any:
     try:
         return deserialize(messages[index])
     except SerdeError as error:
@@ -138,7 +138,7 @@ class _Layout:
     """Places of a message's fields, and its bytes other than stamp, numbers and padding."""
 
     def __init__(self, messages: Sequence[bytes], index: int) -> None:
-        message, first = _decoded(messages, index), messages[index]
+        message, first = _decode_one(messages, index), messages[index]
         self.length = len(first)
         self.names = tuple(message.name)
         self.order = '<' if first[1] else '>'
@@ -178,21 +178,21 @@ class _Layout:
         self.mask = mask[self.words]
         self.value = np.frombuffer(first, np.uint32, words)[self.words] & self.mask
 
-    def _array(self, joined: bytes, kind: str, offset: int, width: int) -> np.ndarray:
+    def _array(self, data: bytes, kind: str, offset: int, width: int) -> np.ndarray:
         """Return the values of every message at an offset; a view, unaligned."""
         dtype = np.dtype(kind)
-        return np.ndarray((len(joined) // self.length, width), dtype, joined, offset,
+        return np.ndarray((len(data) // self.length, width), dtype, data, offset,
                           (self.length, dtype.itemsize))
 
-    def fits(self, joined: bytes) -> np.ndarray:
+    def fits(self, data: bytes) -> np.ndarray:
         """Return which messages of this length have this layout."""
-        words = self._array(joined, '=u4', 0, self.length // 4)[:, self.words]
+        words = self._array(data, '=u4', 0, self.length // 4)[:, self.words]
         return ((words & self.mask) == self.value).all(axis=1)
 
-    def read(self, joined: bytes, fields: Sequence[str]) -> tuple[np.ndarray, list[np.ndarray]]:
+    def read(self, data: bytes, fields: Sequence[str]) -> tuple[np.ndarray, list[np.ndarray]]:
         """Return stamps and the numbers of all fields, copied; of width 0 if not requested."""
-        seconds = self._array(joined, self.order + 'i4', HEADER_SIZE, 1)[:, 0].astype(np.int64)
-        nanoseconds = self._array(joined, self.order + 'u4', HEADER_SIZE + 4, 1)[:, 0]
+        seconds = self._array(data, self.order + 'i4', HEADER_SIZE, 1)[:, 0].astype(np.int64)
+        nanoseconds = self._array(data, self.order + 'u4', HEADER_SIZE + 4, 1)[:, 0]
         return seconds * 10**9 + nanoseconds, [
-            self._array(joined, self.order + 'f8', place, count if which in fields else 0)
+            self._array(data, self.order + 'f8', place, count if which in fields else 0)
             .astype(np.float64) for which, (place, count) in self.spans.items()]

@@ -23,6 +23,7 @@ from pathlib import Path
 import re
 
 from cpg_ros.common.command_line import printable, progress_bar
+from cpg_ros.fitting.recordings.downsampling import pluralize
 from cpg_ros.fitting.recordings.recording import (
     abbreviate,
     ANGLE_UNITS,
@@ -31,7 +32,7 @@ from cpg_ros.fitting.recordings.recording import (
     INDEXED_NAME,
     JOINTS,
     MAX_TIME,
-    merged,
+    merge_chunks,
     Option,
     Recording,
     RecordingError,
@@ -52,7 +53,6 @@ from cpg_ros.fitting.recordings.tables import (
     seconds_of,
     SEPARATORS,
 )
-from cpg_ros.fitting.recordings.thinned import pluralize
 import numpy as np
 
 # Columns of a table: time, angles of joints, loads on feet.
@@ -109,14 +109,14 @@ def split(header: str) -> tuple[str, str | None]:
 
 def load_columns(headers: list[str]) -> list[Column]:
     """Return the columns of foot loads or contacts, if there are two or more."""
-    found = []
+    loads = []
     for k, header in enumerate(headers):
         name, unit = split(header)
         words = {word.lower() for word in re.findall(r'[A-Z]?[a-z]+|[A-Z]+', name)}
         if (len(words) > 1 and words & LOAD_WORDS and not words & AXIS_WORDS
                 and (unit is None or unit.lower() not in ANGLE_UNITS)):
-            found.append(Column(k, header, name, 1.0))
-    return found if len(found) > 1 else []
+            loads.append(Column(k, header, name, 1.0))
+    return loads if len(loads) > 1 else []
 
 
 def read_csv(path: str | Path, unit: str | None = None, time: str | None = None,
@@ -160,7 +160,7 @@ def read_csv(path: str | Path, unit: str | None = None, time: str | None = None,
                     yield chunk
                     bar(min(size, table.read))
 
-            recording = merged(chunks(), printable(str(path)),
+            recording = merge_chunks(chunks(), printable(str(path)),
                                [column.joint for column in table.columns])
     return replace(recording, notes=(*dict.fromkeys(table.notes), *recording.notes),
                    cycle=np.nan if table.in_percent else 0.0,
@@ -196,7 +196,7 @@ class _Table:
         self.lines = chain(rest, file)
         self.delimiter = max(DELIMITERS, key=line.count)
         headers = [header.strip() for header in self._cells(line.lstrip('#'), self.line)]
-        if echoed := self._echoed(headers):
+        if echoed := self._echo_header(headers):
             headers, self.lines = echoed, chain([line], self.lines)
             self.line -= 1
         while len(headers) > 2 and not headers[-1] and not echoed:
@@ -244,9 +244,9 @@ class _Table:
             self.notes.append('commas are taken for decimal points')
         self.lines = chain([first] if first else [], self.lines)
         places = _tidy(headers, cells)
-        return self._widened(headers, *places) if places else headers
+        return self._pivot(headers, *places) if places else headers
 
-    def _echoed(self, cells: list[str]) -> list[str]:
+    def _echo_header(self, cells: list[str]) -> list[str]:
         """Return headers for the output of ``ros2 topic echo --csv``, [] for any other line.
 
         Its lines are the seconds and nanoseconds of the stamp, the frame, the names, positions,
@@ -263,7 +263,7 @@ class _Table:
         self.notes.append('taken for the output of ros2 topic echo --csv')
         return ['sec', 'nanosec', '', *[''] * len(names), *names, *[''] * len(rest)]
 
-    def _widened(self, headers: list[str], name: int, value: int) -> list[str]:
+    def _pivot(self, headers: list[str], name: int, value: int) -> list[str]:
         """Convert a table with a line for each value into one with a column for each joint.
 
         Args:
@@ -312,21 +312,21 @@ class _Table:
         self.rest, self.in_percent = -1, False
         names, units = zip(*map(split, headers), strict=True)
 
-        def called(kind: re.Pattern[str]) -> list[int]:
+        def columns_like(kind: re.Pattern[str]) -> list[int]:
             return [k for k, name in enumerate(names) if kind.match(name)]
 
         candidates = [(k, units[k] or match[2]) for k, name in enumerate(names)
                  if (match := TIME.match(name))]
         candidates = [(k, unit) for k, unit in candidates if unit is None or unit in TIME_UNITS]
-        seconds, nanoseconds = called(SECONDS), called(NANOSECONDS)
+        seconds, nanoseconds = columns_like(SECONDS), columns_like(NANOSECONDS)
         if len(candidates) != 1 and len(seconds) == len(nanoseconds) == 1:
             self.rest = nanoseconds[0]
             return Column(seconds[0], headers[seconds[0]], '', 1.0)
-        in_percent = [k for k in called(CYCLE) if units[k] in (None, '%')]
+        in_percent = [k for k in columns_like(CYCLE) if units[k] in (None, '%')]
         if not candidates and len(in_percent) == 1:
             self.in_percent = True
             return Column(in_percent[0], headers[in_percent[0]], '', 0.01)
-        candidates = candidates or [(k, None) for k in called(RECEIPT)[:1]]
+        candidates = candidates or [(k, None) for k in columns_like(RECEIPT)[:1]]
         if len(candidates) != 1:
             raise RecordingError(
                 f'{self.path}, line {self.line}: '
@@ -349,10 +349,10 @@ class _Table:
                 ) -> list[Column]:
         """Find the joints' columns."""
         columns, others = [], []
-        taken = {self.time.index, self.rest, *(column.index for column in self.loads)}
+        other_columns = {self.time.index, self.rest, *(column.index for column in self.loads)}
         for k, header in enumerate(headers):
             name, unit = split(header)
-            if k in taken or not name or any(
+            if k in other_columns or not name or any(
                     kind.match(name) for kind in (RECEIPT, SECONDS, NANOSECONDS)):
                 continue
             if INDEXED_NAME.match(header):
@@ -365,11 +365,11 @@ class _Table:
         positions = [column for column in columns if INDEXED_NAME.match(column.header)] or [
             replace(column, joint=match[match.lastindex or 0])
             for column in columns if (match := POSITION.match(column.joint))]
-        named = {column.index: column for column in (*columns, *positions)}
+        angle_columns = {column.index: column for column in (*columns, *positions)}
         if joints:
             matches = []
             for pattern in joints:
-                fitting = [column for column in named.values() if any(
+                fitting = [column for column in angle_columns.values() if any(
                     pattern == name or fnmatchcase(name, pattern)
                     for name in (column.joint, column.header))]
                 if not fitting:
@@ -380,10 +380,10 @@ class _Table:
         else:
             others += [other.header for other in columns] if positions else []
             columns = positions or columns
-            left = [header for header in others
-                    if header not in {column.header for column in columns}]
-            if left:
-                self.notes.append(f'{len(left)} columns left out: {abbreviate(left)}')
+            ignored = [header for header in others
+                       if header not in {column.header for column in columns}]
+            if ignored:
+                self.notes.append(f'{len(ignored)} columns left out: {abbreviate(ignored)}')
         names = [column.joint for column in columns]
         if not names:
             raise RecordingError(f'{self.path}, line {self.line}: no column of angles')

@@ -105,14 +105,14 @@ def read_recording(path: str | Path, format_name: str = '', *, robot_joints: Seq
     with suppress(OSError), path.open('rb') if path.is_file() else BytesIO() as file:
         refuse_stand_in(path, file.read(64))
     args = FORMATS[format_name] if format_name else format_of(path)
-    given = {name: value for name, value in options.items() if value is not None and value != ()
-             and value != []}
-    for name in given:
-        if why := args.validate(name):
-            raise InputError(f'{path}: option {name}: {why}')
-    if robot_joints and 'joints' not in given and 'some' in args.features:
-        given |= {'joints': robot_joints, 'some': True}
-    recording = args.read(path, progress=progress, **given)
+    values = {name: value for name, value in options.items() if value is not None and value != ()
+              and value != []}
+    for name in values:
+        if reason := args.validate(name):
+            raise InputError(f'{path}: option {name}: {reason}')
+    if robot_joints and 'joints' not in values and 'some' in args.features:
+        values |= {'joints': robot_joints, 'some': True}
+    recording = args.read(path, progress=progress, **values)
     if robot_joints and all(map(INDEXED_NAME.match, recording.joints)):
         recording = name_positions(recording, robot_joints)
     return recording if cycle is None else repeat_stride(recording, cycle)
@@ -158,10 +158,10 @@ def check_reading_options(args: Namespace) -> None:
     """
     if name := chosen_format(args):
         for option in reading_options():
-            if getattr(args, option.name) and (why := FORMATS[name].validate(option.name)):
-                raise InputError(f'argument --{option.name}: {why}')
-        if args.kp is not None and (why := FORMATS[name].validate('servo')):
-            raise InputError(f'argument --kp: {why}')
+            if getattr(args, option.name) and (reason := FORMATS[name].validate(option.name)):
+                raise InputError(f'argument --{option.name}: {reason}')
+        if args.kp is not None and (reason := FORMATS[name].validate('servo')):
+            raise InputError(f'argument --kp: {reason}')
     if args.kp is None and args.kd is not None:
         raise InputError('argument --kd: without --kp')
 

@@ -28,17 +28,17 @@ from cpg_ros.fitting.recordings.cdr import (
     SerializedBlock,
     UndecodableError,
 )
+from cpg_ros.fitting.recordings.downsampling import Downsampler, MAX_RAW_SAMPLES
 from cpg_ros.fitting.recordings.low_state import decode_low_states, MOTOR_NAMES
 from cpg_ros.fitting.recordings.recording import (
     abbreviate,
     Chunk,
     joint_list,
-    merged,
+    merge_chunks,
     Recording,
     RecordingError,
     require,
 )
-from cpg_ros.fitting.recordings.thinned import MAX_RAW_SAMPLES, Thinned
 import numpy as np
 
 # The commands of joints, from their positions, velocities and efforts.
@@ -114,42 +114,42 @@ class Stream:
         self.order = tuple(joints)
         #: Prefix of the requested names; text on messages without names; text on the first message
         #: without a position for each name.
-        self.prefix, self.unnamed, self.first_odd = '', False, ''
-        self.wanted = set(joints)
-        self.taken: set[str] = set()
+        self.prefix, self.unnamed, self.example = '', False, ''
+        self.selection = set(joints)
+        self.output_joints: set[str] = set()
         #: Messages that are not decoded yet, and their times of receipt, ns.
         self.messages: list[bytes] = []
-        self.received: list[int] = []
+        self.receive_times: list[int] = []
         self._bytes = 0
         #: Header stamps and receive times in ns, names, positions.
         self.parts: list[tuple[np.ndarray, np.ndarray, tuple[str, ...], np.ndarray]] = []
         self._size = 0
         #: For a long topic: joints -> samples on a grid; then the seconds by which the other clock
         #: has gained since the first message.
-        self._thinned: dict[tuple[str, ...], Thinned] = {}
-        self._by_headers, self._ahead = True, 0
+        self._grids: dict[tuple[str, ...], Downsampler] = {}
+        self._by_headers, self._offset = True, 0
         self.joints: dict[str, None] = {}
-        self.count = self.mute = self.odd = self.slack = self.unstamped = 0
+        self.count = self.empty = self.uneven = self.partial = self.unstamped = 0
         #: Joints with a position, but not what the servo needs besides; and those whose effort
         #: was ever a number but 0.
-        self.lacking: dict[str, None] = {}
-        self.pulled: set[str] = set()
-        self.dated = False
+        self.incomplete_joints: dict[str, None] = {}
+        self.effort_joints: set[str] = set()
+        self.since_epoch = False
 
     @property
-    def stamped_so_far(self) -> bool:
+    def mostly_stamped(self) -> bool:
         """Whether most undecoded messages have a header stamp."""
-        stamped = sum(int(np.count_nonzero(stamps)) for stamps, *_ in self.parts)
-        return stamped > 0.5 * self._size
+        count = sum(int(np.count_nonzero(stamps)) for stamps, *_ in self.parts)
+        return count > 0.5 * self._size
 
     @property
     def stamped(self) -> bool:
         """Whether any message has a header stamp."""
-        return self.unstamped < self.count - self.mute - self.odd - self.slack
+        return self.unstamped < self.count - self.empty - self.uneven - self.partial
 
     def add(self, received: int, message: bytes) -> None:
         """Add a serialised message, received at a time in ns; errors as of decode."""
-        self.received.append(received)
+        self.receive_times.append(received)
         self.messages.append(message)
         self._bytes += len(message)
         if len(self.messages) == BATCH_SIZE or self._bytes > BATCH_BYTES:
@@ -162,114 +162,114 @@ class Stream:
             RecordingError: a message is no JointState.
 
         """
-        received = np.array(self.received, np.int64)
+        received = np.array(self.receive_times, np.int64)
         try:
             efforts = self.servo is not None
             blocks = (decode_low_states(self.messages, self.order, efforts, self.kind)
                       if self.kind in MOTOR_NAMES else in_order(decode(self.messages, efforts)))
             for block in blocks:
-                self._keep(block, received[block.rows])
+                self._add_block(block, received[block.rows])
         except UndecodableError as error:
             raise RecordingError(
                 f'{self.source}{self.topic}: message {self.count + error.index + 1} is not '
                 f'a {self.kind}: {line(error)}') from error
         self.count += len(self.messages)
-        self.messages, self.received, self._bytes = [], [], 0
+        self.messages, self.receive_times, self._bytes = [], [], 0
 
-    def _keep(self, block: SerializedBlock, received: np.ndarray) -> None:
+    def _add_block(self, block: SerializedBlock, received: np.ndarray) -> None:
         stamps, positions = block.stamps, block.positions
-        names = self._named(block.names, positions.shape[1])
+        names = self._joint_names(block.names, positions.shape[1])
         if not positions.shape[1]:
-            self.mute += len(stamps)
+            self.empty += len(stamps)
         elif positions.shape[1] != len(names):
-            self.odd += len(stamps)
-            self.first_odd = self.first_odd or (
+            self.uneven += len(stamps)
+            self.example = self.example or (
                 f', such as message {self.count + int(block.rows[0]) + 1}: '
                 f'{positions.shape[1]} positions for {len(names)} names')
         elif self.servo and not (positions.shape == block.efforts.shape and (
                 not self.servo.kd or positions.shape == block.velocities.shape)):
-            self.slack += len(stamps)
-            self.lacking.update(dict.fromkeys(names))
+            self.partial += len(stamps)
+            self.incomplete_joints.update(dict.fromkeys(names))
         else:
             if self.servo:
                 pulling = (np.isfinite(block.efforts) & (block.efforts != 0.0)).any(axis=0)
-                self.pulled.update(compress(names, pulling))
+                self.effort_joints.update(compress(names, pulling))
                 positions = self.servo.command(positions, block.velocities, block.efforts)
             self.joints.update(dict.fromkeys(names))
             self.unstamped += int((stamps == 0).sum())
-            self.dated = self.dated or bool((stamps > EPOCH_THRESHOLD).any())
-            if self.wanted:
-                names, positions = _of_joints(self.wanted, names, positions)
+            self.since_epoch = self.since_epoch or bool((stamps > EPOCH_THRESHOLD).any())
+            if self.selection:
+                names, positions = _of_joints(self.selection, names, positions)
             self.parts.append((stamps, received, names, positions))
             self._size += len(stamps)
             if self._size >= MAX_RAW_SAMPLES:
-                self._thin()
+                self._downsample()
 
-    def _named(self, names: tuple[str, ...], count: int) -> tuple[str, ...]:
+    def _joint_names(self, names: tuple[str, ...], count: int) -> tuple[str, ...]:
         """Return the names of positions in the requested form."""
         if count and not names:
             self.unnamed = True
             return self.order if len(self.order) == count else tuple(
                 f'position[{k}]' for k in range(count))
-        if not self.wanted or not self.wanted.isdisjoint(names):
+        if not self.selection or not self.selection.isdisjoint(names):
             return names
-        prefixes = Counter(name[:-len(joint)] for name in names for joint in self.wanted
+        prefixes = Counter(name[:-len(joint)] for name in names for joint in self.selection
                         if name.endswith(joint))
-        (prefix, most), *others = [*prefixes.most_common(2), ('', 0)]
+        (prefix, largest), *others = [*prefixes.most_common(2), ('', 0)]
         # Equally many joints under another prefix belong to another robot.
-        if most < 2 or others[0][1] == most:
+        if largest < 2 or others[0][1] == largest:
             return names
         self.prefix = prefix
         return tuple(name.removeprefix(prefix) for name in names)
 
-    def _thin(self) -> None:
+    def _downsample(self) -> None:
         """Downsample the pending samples, with both clocks."""
-        if not self._thinned:
-            self._by_headers = self.stamped_so_far
+        if not self._grids:
+            self._by_headers = self.mostly_stamped
         for stamps, received, names, positions in self.parts:
-            if self._by_headers and self.dated and not stamps.all():
-                there = stamps != 0
-                stamps, received, positions = stamps[there], received[there], positions[there]
+            if self._by_headers and self.since_epoch and not stamps.all():
+                valid = stamps != 0
+                stamps, received, positions = stamps[valid], received[valid], positions[valid]
             if not len(stamps):
                 continue
-            own, other = (stamps, received) if self._by_headers else (received, stamps)
-            self._ahead = self._ahead or int(other[0] - own[0])
-            self._thinned.setdefault(names, Thinned()).add(
-                own, np.column_stack([positions, 1e-9 * (other - own - self._ahead)]))
+            clock, other = (stamps, received) if self._by_headers else (received, stamps)
+            self._offset = self._offset or int(other[0] - clock[0])
+            self._grids.setdefault(names, Downsampler()).add(
+                clock, np.column_stack([positions, 1e-9 * (other - clock - self._offset)]))
         self.parts, self._size = [], MAX_RAW_SAMPLES
 
     def notes(self, headers: bool) -> list[str]:
         """Return a line for each kind of data that is dropped."""
-        counts = ((self.mute, 'without positions'),
-                  (self.odd, 'with more or fewer positions than names' + self.first_odd),
-                  (self.slack, f'without {self.servo.needs} of each joint' if self.servo else ''),
-                  (self.unstamped if headers and self.dated else 0, 'without a stamp'))
-        named = [f'{self.topic}: the names without {self.prefix!r} before them'] * bool(
+        counts = ((self.empty, 'without positions'),
+                  (self.uneven, f'with more or fewer positions than names{self.example}'),
+                  (self.partial, self.servo and f'without {self.servo.needs} of each joint'),
+                  (self.unstamped if headers and self.since_epoch else 0, 'without a stamp'))
+        name_notes = [f'{self.topic}: the names without {self.prefix!r} before them'] * bool(
             self.prefix) + [
                 f'{self.topic}: no names; ' + (
                     'the positions are taken in the order of the joints asked for or of the robot '
                     'file' if self.order else 'a robot file or --joints gives their order')
                 ] * self.unnamed
-        return [*named, *(f'{self.topic}: {count} of {self.count} messages {what}, left out'
-                  for count, what in counts if count),
-                *(f'{self.topic}: {samples.note}' for samples in self._thinned.values()
+        return [*name_notes, *(f'{self.topic}: {count} of {self.count} messages {text}, left out'
+                  for count, text in counts if count),
+                *(f'{self.topic}: {samples.note}' for samples in self._grids.values()
                   if samples.note)]
 
     def chunks(self, headers: bool) -> Iterator[Chunk]:
         """Yield the samples, and forget them."""
-        for names, samples in self._thinned.items():
-            own, values = samples.taken()
-            other = own + self._ahead + np.rint(1e9 * values[:, -1]).astype(np.int64)
-            pair = (own, other) if self._by_headers else (other, own)
+        for names, samples in self._grids.items():
+            clock, values = samples.flush()
+            other = clock + self._offset + np.rint(1e9 * values[:, -1]).astype(np.int64)
+            pair = (clock, other) if self._by_headers else (other, clock)
             self.parts.append((*pair, names, values[:, :-1]))
-        self._thinned = {}
+        self._grids = {}
         self.parts.reverse()
         while self.parts:
             stamps, received, names, positions = self.parts.pop()
-            if headers and self.dated and not stamps.all():
-                there = stamps != 0
-                stamps, positions = stamps[there], positions[there]
-            names, positions = _of_joints(self.taken, names, positions)
+            if headers and self.since_epoch and not stamps.all():
+                valid = stamps != 0
+                stamps, positions = stamps[valid], positions[valid]
+            names, positions = _of_joints(self.output_joints, names, positions)
             yield stamps if headers else received, names, positions
 
 
@@ -282,7 +282,7 @@ def _of_joints(joints: set[str], names: tuple[str, ...], positions: np.ndarray
     return tuple(names[k] for k in columns), positions[:, columns]
 
 
-def _once_each(streams: list[Stream], joints: Sequence[str]) -> list[str]:
+def _select_topics(streams: list[Stream], joints: Sequence[str]) -> list[str]:
     """Select one topic for every joint that is on several; return a note for each."""
     order = sorted(streams, key=lambda candidate: (
         -len(candidate.joints), candidate.topic.rsplit('/')[-1] != 'joint_states',
@@ -290,7 +290,7 @@ def _once_each(streams: list[Stream], joints: Sequence[str]) -> list[str]:
     owner = {name: stream for stream in reversed(order) for name in stream.joints}
     notes = []
     for stream in streams:
-        stream.taken = {name for name in joints if owner[name] is stream}
+        stream.output_joints = {name for name in joints if owner[name] is stream}
         for other in streams:
             common = [name for name in joints
                       if name in stream.joints and owner[name] is other is not stream]
@@ -299,15 +299,15 @@ def _once_each(streams: list[Stream], joints: Sequence[str]) -> list[str]:
     return notes
 
 
-def _refuse_two_robots(streams: Sequence[Stream], selected: Sequence[str], source: str) -> None:
+def _refuse_two_robots(streams: Sequence[Stream], joint_names: Sequence[str], source: str) -> None:
     """Reject topics of two namespaces that have the same joints."""
-    seen: dict[tuple[str, frozenset[str]], str] = {}
+    topic_of: dict[tuple[str, frozenset[str]], str] = {}
     for stream in streams:
         namespace, _, name = stream.topic.rpartition('/')
-        joints = frozenset(stream.joints).intersection(selected)
+        joints = frozenset(stream.joints).intersection(joint_names)
         if not joints or not namespace:
             continue
-        other = seen.setdefault((name, joints), stream.topic)
+        other = topic_of.setdefault((name, joints), stream.topic)
         if other != stream.topic:
             raise RecordingError(f'{source}: {other} and {stream.topic} have the same joints: '
                                  'choose a topic or a namespace (--topics)')
@@ -321,7 +321,7 @@ def _refuse_lacking(where: str, what: str, joints: list[str]) -> None:
                              'joints to take to do without')
 
 
-def recorded(streams: Sequence[Stream], joints: Sequence[str], source: str,
+def merge_streams(streams: Sequence[Stream], joints: Sequence[str], source: str,
              notes: Sequence[str] = (), some: bool = False) -> Recording:
     """Merge the streams of several topics into one recording.
 
@@ -341,42 +341,42 @@ def recorded(streams: Sequence[Stream], joints: Sequence[str], source: str,
             efforts, or only 0.
 
     """
-    there = list(dict.fromkeys(name for stream in streams for name in stream.joints))
-    whole = f'{source}{", ".join(stream.topic for stream in streams)}'
+    available = list(dict.fromkeys(name for stream in streams for name in stream.joints))
+    topics = f'{source}{", ".join(stream.topic for stream in streams)}'
     for stream in streams:
-        idle = [name for name in stream.lacking if name not in there
+        idle = [name for name in stream.incomplete_joints if name not in available
                 and (not joints or name in joints)]
         if stream.servo:
             _refuse_lacking(f'{source}{stream.topic}', stream.servo.needs, idle)
-    if not there:
-        raise RecordingError('; '.join((f'{whole}: no message with positions', *notes)))
-    present = [name for name in joints if name in there]
+    if not available:
+        raise RecordingError('; '.join((f'{topics}: no message with positions', *notes)))
+    present = [name for name in joints if name in available]
     joints = present if some and present else joints
-    require(joints, there, whole)
-    _refuse_two_robots(streams, joints or there, whole)
-    notes = [*notes, *_once_each(list(streams), joints or there)]
-    read = [stream for stream in streams if stream.taken]
-    whole = f'{source}{", ".join(stream.topic for stream in read)}'
-    headers = all(stream.stamped for stream in read)
+    require(joints, available, topics)
+    _refuse_two_robots(streams, joints or available, topics)
+    notes = [*notes, *_select_topics(list(streams), joints or available)]
+    providers = [stream for stream in streams if stream.output_joints]
+    topics = f'{source}{", ".join(stream.topic for stream in providers)}'
+    headers = all(stream.stamped for stream in providers)
     if not headers:
-        unset = [stream.topic for stream in read if not stream.stamped]
+        unset = [stream.topic for stream in providers if not stream.stamped]
         notes.append(f'no header stamps on {abbreviate(unset)}: the times are those of receipt')
-    elif len({stream.dated for stream in read}) > 1:
+    elif len({stream.since_epoch for stream in providers}) > 1:
         headers = False
-        other = [stream.topic for stream in read if not stream.dated]
-        notes.append(f'{abbreviate(other)}: the stamps come from a different clock than on the '
+        undated = [stream.topic for stream in providers if not stream.since_epoch]
+        notes.append(f'{abbreviate(undated)}: the stamps come from a different clock than on the '
                      "other topics, such as a simulation's: the times are those of receipt")
-    for stream in read:
+    for stream in providers:
         if stream.servo:
             _refuse_lacking(f'{source}{stream.topic}', 'effort but 0',
-                            sorted(stream.taken - stream.pulled))
+                            sorted(stream.output_joints - stream.effort_joints))
             notes.append(f'{stream.topic}: commands of the joints, computed with kp '
                          f'{stream.servo.kp:g} and kd {stream.servo.kd:g}')
         notes += stream.notes(headers)
-    chunks = (chunk for stream in read for chunk in stream.chunks(headers))
-    recording = merged(chunks, whole, joints)
+    chunks = (chunk for stream in providers for chunk in stream.chunks(headers))
+    recording = merge_chunks(chunks, topics, joints)
     return replace(recording, notes=(*notes, *recording.notes),
-                   commanded=any(stream.servo for stream in read))
+                   commanded=any(stream.servo for stream in providers))
 
 
 # Joint states as they arrive, kept as bytes until a recording is requested.
@@ -392,11 +392,11 @@ class LiveRecording:
 
     def __init__(self, topics: Sequence[str], window: float) -> None:
         self.window = window
-        self._kept: dict[str, deque[tuple[int, bytes]]] = {topic: deque() for topic in topics}
+        self._messages: dict[str, deque[tuple[int, bytes]]] = {topic: deque() for topic in topics}
 
     def add(self, topic: str, received: int, message: bytes) -> None:
         """Add a serialised JointState received at a time in ns; drop old ones."""
-        samples = self._kept[topic]
+        samples = self._messages[topic]
         samples.append((received, message))
         if self.window > 0.0:
             oldest = received - int(self.window * 1e9)
@@ -405,9 +405,9 @@ class LiveRecording:
 
     def copy(self) -> 'LiveRecording':
         """Return a copy, to be decoded while more messages arrive."""
-        other = LiveRecording(tuple(self._kept), self.window)
-        for topic, samples in self._kept.items():
-            other._kept[topic].extend(samples)
+        other = LiveRecording(tuple(self._messages), self.window)
+        for topic, samples in self._messages.items():
+            other._messages[topic].extend(samples)
         return other
 
     def recording(self, joints: Sequence[str] = (), some: bool = False,
@@ -423,13 +423,13 @@ class LiveRecording:
             RecordingError: there is no message, or none can be used.
 
         """
-        if not any(self._kept.values()):
-            raise RecordingError(f'{", ".join(self._kept)}: no joint states came in')
+        if not any(self._messages.values()):
+            raise RecordingError(f'{", ".join(self._messages)}: no joint states came in')
         streams = []
-        for topic, samples in self._kept.items():
+        for topic, samples in self._messages.items():
             stream = Stream(topic, joints, servo)
             for received, message in samples:
                 stream.add(received, message)
             stream.decode()
             streams.append(stream)
-        return recorded(streams, joints, '', some=some)
+        return merge_streams(streams, joints, '', some=some)

@@ -28,6 +28,7 @@ from typing import Annotated, Any
 from cpg_ros.common.errors import ShortRepr
 from cpg_ros.common.files import resource_folder
 from cpg_ros.common.yaml_reader import within, YamlReader
+from cpg_ros.fitting.recordings.downsampling import pluralize
 from cpg_ros.fitting.recordings.recording import (
     abbreviate,
     FootLoads,
@@ -37,7 +38,6 @@ from cpg_ros.fitting.recordings.recording import (
     recording_of,
     RecordingError,
 )
-from cpg_ros.fitting.recordings.thinned import pluralize
 import numpy as np
 
 # Files of segments: the markers that span each part of a body, and the parts that a joint
@@ -103,10 +103,10 @@ class Segments:
     body: tuple[str, ...] = ()
     feet: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
-    def named_as(self, there: Sequence[str]) -> 'Segments':
+    def named_as(self, available: Sequence[str]) -> 'Segments':
         """Return the same segments with alternatives applied for markers that exist."""
-        names = {name: next((marker for marker in others if marker in there), name)
-                 for name, others in self.alternatives.items() if name not in there}
+        names = {name: next((marker for marker in others if marker in available), name)
+                 for name, others in self.alternatives.items() if name not in available}
 
         def ends(markers: tuple[str, ...]) -> tuple[str, ...]:
             return tuple(dict.fromkeys(names.get(marker, marker) for marker in markers))
@@ -261,16 +261,16 @@ def marker_names(labels: Sequence[str], points: np.ndarray) -> tuple[tuple[str, 
         subjects.setdefault(name, set()).add(label)
     names = [name if len(subjects[name]) == 1 else label
              for label, name in zip(labels, short, strict=True)]
-    seen = np.isfinite(points).all(axis=2).sum(axis=0)
+    counts = np.isfinite(points).all(axis=2).sum(axis=0)
     notes = []
     for name in dict.fromkeys(name for name in names if names.count(name) > 1):
         indices = sorted((k for k, other in enumerate(names) if other == name),
-                        key=lambda k: -seen[k])
+                        key=lambda k: -counts[k])
         for number, k in enumerate(indices[1:], 2):
             names[k] = f'{name}#{number}'
         notes.append(f'{len(indices)} markers are called {name!r}: the one seen in '
-                     f'{pluralize(int(seen[indices[0]]), "sample")} is taken, the other in '
-                     f'{seen[indices[1]]}')
+                     f'{pluralize(int(counts[indices[0]]), "sample")} is taken, the other in '
+                     f'{counts[indices[1]]}')
     return tuple(names), notes
 
 
@@ -336,28 +336,28 @@ def joint_recording(markers: Markers, segments: str | Path | Segments | None,
     solid = markers.points.shape[2] == 3
     needs = {name: segments.markers(name, solid) for name in names}
     complete = [name for name in names if set(needs[name]) <= set(markers.names)]
-    lost = [name for name in names if name not in complete]
-    missing = sorted({marker for name in lost for marker in needs[name]} - set(markers.names))
-    if lost and (joints or not complete):
+    dropped = [name for name in names if name not in complete]
+    missing = sorted({marker for name in dropped for marker in needs[name]} - set(markers.names))
+    if dropped and (joints or not complete):
         raise RecordingError(f'{source}: no marker {abbreviate(missing)}, which '
-                             f'{abbreviate(lost)} need{"s" * (len(lost) == 1)}; there are '
+                             f'{abbreviate(dropped)} need{"s" * (len(dropped) == 1)}; there are '
                              f'{abbreviate(markers.names, 40)}')
-    if lost:
-        notes.append(f'without the markers {abbreviate(missing)}, left out: {abbreviate(lost)}')
-    used = list(dict.fromkeys(marker for name in complete for marker in needs[name]))
-    points = _seen(markers, segments.least_likelihood, used, notes)
+    if dropped:
+        notes.append(f'without the markers {abbreviate(missing)}, left out: {abbreviate(dropped)}')
+    marker_names = list(dict.fromkeys(marker for name in complete for marker in needs[name]))
+    points = _points(markers, segments.least_likelihood, marker_names, notes)
     angles = {name: _angle(name, segments, markers, points) for name in complete}
-    silent = [name for name, angle in angles.items() if not np.isfinite(angle).any()]
-    empty = [name for name in used
+    unseen = [name for name, angle in angles.items() if not np.isfinite(angle).any()]
+    empty = [name for name in marker_names
              if not np.isfinite(points[:, markers.names.index(name)]).all(axis=1).any()]
     lacking = f'; without any place: {abbreviate(empty)}' if empty else ''
-    if silent and (joints or len(silent) == len(angles)):
-        raise RecordingError(f'{source}: no angle of {abbreviate(silent)}: its markers are never '
-                             f'seen together{lacking}')
-    if silent:
-        notes.append(f'never seen, left out: {abbreviate(silent)}{lacking}')
-    kept = [name for name in angles if name not in silent]
-    return travelling(source, kept, np.column_stack([angles[name] for name in kept]), notes,
+    if unseen and (joints or len(unseen) == len(angles)):
+        raise RecordingError(f'{source}: no angle of {abbreviate(unseen)}: its markers are '
+                             f'never seen together{lacking}')
+    if unseen:
+        notes.append(f'never seen, left out: {abbreviate(unseen)}{lacking}')
+    angles = {name: angle for name, angle in angles.items() if name not in unseen}
+    return travelling(source, list(angles), np.column_stack(list(angles.values())), notes,
                       segments, markers, points)
 
 
@@ -376,14 +376,14 @@ def travelling(source: Path, joints: Sequence[str], angles: np.ndarray, notes: S
 
     """
     recording = recording_of(source, markers.stamps, joints, angles, notes)
-    there = set(markers.names)
-    body = [markers.names.index(name) for name in segments.body if name in there]
+    available = set(markers.names)
+    body = [markers.names.index(name) for name in segments.body if name in available]
     feet = {leg: [markers.names.index(name) for name in names]
-            for leg, names in segments.feet.items() if set(names) <= there}
+            for leg, names in segments.feet.items() if set(names) <= available}
     if points.shape[2] < 3 or not body or not feet:
         return recording
     place, times = points[:, body].mean(axis=1), 1e-9 * markers.stamps
-    below = place[:, None] - points[:, [marker for own in feet.values() for marker in own]]
+    below = place[:, None] - points[:, [marker for columns in feet.values() for marker in columns]]
     if not np.isfinite(below).all(axis=2).any():
         return recording
     # The last axis from the feet upward.
@@ -392,11 +392,11 @@ def travelling(source: Path, joints: Sequence[str], angles: np.ndarray, notes: S
     points, place = (np.sign(below[up]) * np.roll(array, 2 - up, axis=-1)
                      for array in (points, place))
     if not math.isnan(markers.unit):
-        seen = np.isfinite(place).all(axis=1)
+        finite = np.isfinite(place).all(axis=1)
         recording = replace(recording, body=markers.unit * np.column_stack([
-            np.interp(recording.times, times[seen] - recording.start, column)
-            for column in place[seen].T]))
-    loads = contacts(footfalls(times, place, {leg: points[:, own] for leg, own in feet.items()}),
+            np.interp(recording.times, times[finite] - recording.start, column)
+            for column in place[finite].T]))
+    loads = contacts(footfalls(times, place, {leg: points[:, at] for leg, at in feet.items()}),
                      recording.start, recording.times)
     return recording if loads is None else replace(recording,
                                                    loads=replace(loads, by_motion=True))
@@ -430,20 +430,20 @@ def footfalls(times: np.ndarray, body: np.ndarray, feet: Mapping[str, np.ndarray
     forward /= np.linalg.norm(forward, axis=1, keepdims=True)
     events: list[Footfall] = []
     for leg, foot in feet.items():
-        own = []
+        falls = []
         for marker, down in ((0, True), (-1, False)):
             along = np.sum((foot[:, marker] - body)[:, :2] * forward, axis=1)
             along *= 1.0 if down else -1.0
-            seen = np.isfinite(along)
-            if not seen.any():
+            finite = np.isfinite(along)
+            if not finite.any():
                 return []
-            least = MIN_STEP_RATIO * np.ptp(np.percentile(along[seen], (5.0, 95.0)))
-            own += [(time, down) for time in
-                    times[seen][find_peaks(along[seen], prominence=least)[0]].tolist()]
-        states = [down for _, down in sorted(own)]
+            min_step = MIN_STEP_RATIO * np.ptp(np.percentile(along[finite], (5.0, 95.0)))
+            falls += [(time, down) for time in
+                      times[finite][find_peaks(along[finite], prominence=min_step)[0]].tolist()]
+        states = [down for _, down in sorted(falls)]
         if any(one == after for one, after in pairwise(states)):
             return []
-        events += [(leg, time, down) for time, down in own]
+        events += [(leg, time, down) for time, down in falls]
     return events
 
 
@@ -459,39 +459,39 @@ def contacts(events: Sequence[Footfall], start: float, times: np.ndarray) -> Foo
         1 on the ground and 0 in the air; None unless every foot has both.
 
     """
-    known: dict[str, list[tuple[float, bool]]] = {}
+    by_leg: dict[str, list[tuple[float, bool]]] = {}
     for leg, time, down in sorted(events):
-        known.setdefault(leg, []).append((time - start, down))
-    if len(known) < 2 or not all(len({down for _, down in own}) == 2 for own in known.values()):
+        by_leg.setdefault(leg, []).append((time - start, down))
+    if len(by_leg) < 2 or any(len({down for _, down in steps}) < 2 for steps in by_leg.values()):
         return None
-    begin, end = (most([one([time for time, _ in own]) for own in known.values()])
+    begin, end = (most([one([time for time, _ in steps]) for steps in by_leg.values()])
                   for most, one in ((max, min), (min, max)))
     # Whole strides where there are any, so that fractions of the time are those of a stride.
-    landed = [[time for time, down in own if down and begin <= time <= end]
-              for own in known.values()]
-    begin, end = max(((own[0], own[-1]) for own in landed if len(own) > 1),
+    touchdowns = [[time for time, down in steps if down and begin <= time <= end]
+                  for steps in by_leg.values()]
+    begin, end = max(((steps[0], steps[-1]) for steps in touchdowns if len(steps) > 1),
                      key=lambda one: one[1] - one[0], default=(begin, end))
     times = times[(times >= begin) & (times <= end)]
     rows = []
-    for own in known.values():
-        when, state = np.array(own, float).T
+    for steps in by_leg.values():
+        when, state = np.array(steps, float).T
         rows.append(state[np.searchsorted(when, times, side='right') - 1])
     if not len(times) or min(map(np.ptp, rows)) == 0.0:
         return None
-    return FootLoads(tuple(known), times, np.column_stack(rows))
+    return FootLoads(tuple(by_leg), times, np.column_stack(rows))
 
 
-def _seen(markers: Markers, likely: float, used: Sequence[str], notes: list[str]) -> np.ndarray:
+def _points(markers: Markers, likely: float, names: Sequence[str], notes: list[str]) -> np.ndarray:
     """Return the points, nan where they are missing or unlikely."""
     points = markers.points.astype(float)
     points[~(np.abs(points) <= MAX_COORDINATE).all(axis=2)] = np.nan
     if markers.likelihoods is None:
         return points
     unlikely = ~(markers.likelihoods >= likely)
-    columns = [markers.names.index(name) for name in used]
-    there = np.isfinite(points[:, columns]).all(axis=2)
-    if count := int((unlikely[:, columns] & there).sum()):
-        notes.append(f'{count / max(1, int(there.sum())):.0%} of the places of {len(columns)} '
+    columns = [markers.names.index(name) for name in names]
+    finite = np.isfinite(points[:, columns]).all(axis=2)
+    if count := int((unlikely[:, columns] & finite).sum()):
+        notes.append(f'{count / max(1, int(finite.sum())):.0%} of the places of {len(columns)} '
                      f'markers have a likelihood below {likely:g}: not used')
     points[unlikely] = np.nan
     return points

@@ -21,6 +21,7 @@ from pathlib import Path
 import zipfile
 
 from cpg_ros.common import files
+from cpg_ros.fitting.recordings.downsampling import pluralize
 from cpg_ros.fitting.recordings.recording import (
     abbreviate,
     ANGLE_UNITS,
@@ -33,7 +34,6 @@ from cpg_ros.fitting.recordings.recording import (
     UNIT,
 )
 from cpg_ros.fitting.recordings.tables import FPS, stamps_of_frames, UnpackedSize
-from cpg_ros.fitting.recordings.thinned import pluralize
 import numpy as np
 
 #: Names of arrays: of times, rates, units and names.
@@ -78,12 +78,12 @@ def _arrays(path: Path, notes: list[str]) -> dict[str, np.ndarray]:
     """Read all arrays of numbers and texts."""
     with files.opened(path, RecordingError, largest=MAX_SIZE) as file:
         try:
-            with zipfile.ZipFile(file) as packed:
-                members = [member.filename for member in packed.infolist()]
+            with zipfile.ZipFile(file) as zipped:
+                members = [member.filename for member in zipped.infolist()]
                 names = [name for name in members if name.endswith('.npy')]
-                unpacked = UnpackedSize(os.fstat(file.fileno()).st_size)
+                size = UnpackedSize(os.fstat(file.fileno()).st_size)
                 for name in names:
-                    unpacked.add(_needed(packed, name))
+                    size.add(_array_size(zipped, name))
             if others := [name for name in members if name not in names]:
                 notes.append(f'{pluralize(len(others), "member")} that are no arrays left out: '
                              f'{abbreviate(others)}')
@@ -94,23 +94,23 @@ def _arrays(path: Path, notes: list[str]) -> dict[str, np.ndarray]:
             raise RecordingError(f'{path}: {error}') from error
         # Neither zipfile nor numpy lists what damaged archives make them raise.
         except Exception as error:
-            why = ' '.join(str(error).split()).rstrip('.') or type(error).__name__
+            reason = ' '.join(str(error).split()).rstrip('.') or type(error).__name__
             raise RecordingError(
-                f"{path}: not an archive of numpy's arrays: {why[:200]}") from error
+                f"{path}: not an archive of numpy's arrays: {reason[:200]}") from error
 
 
-def _needed(packed: zipfile.ZipFile, name: str) -> int:
+def _array_size(archive: zipfile.ZipFile, name: str) -> int:
     """Return the bytes that an array takes as float64, from its header."""
-    with packed.open(name) as member:
+    with archive.open(name) as member:
         version = np.lib.format.read_magic(member)
         read = (np.lib.format.read_array_header_1_0 if version == (1, 0)
                 else np.lib.format.read_array_header_2_0)
         shape, _, kind = read(member)
     # Use Python's integers: a product of sizes may overflow numpy's.
-    return max(packed.getinfo(name).file_size, math.prod(shape) * max(8, kind.itemsize))
+    return max(archive.getinfo(name).file_size, math.prod(shape) * max(8, kind.itemsize))
 
 
-def _named(arrays: Mapping[str, np.ndarray], names: Sequence[str]) -> str:
+def _find_key(arrays: Mapping[str, np.ndarray], names: Sequence[str]) -> str:
     """Return which of the names an array has, or ''."""
     return next((name for name in arrays if name.lower() in names), '')
 
@@ -118,64 +118,64 @@ def _named(arrays: Mapping[str, np.ndarray], names: Sequence[str]) -> str:
 def _angles(arrays: Mapping[str, np.ndarray], path: Path, notes: list[str]
             ) -> tuple[list[str], np.ndarray]:
     """Return the joints' names and their angles."""
-    table, listed = _named(arrays, POSITIONS), _named(arrays, NAMES)
+    table, names_key = _find_key(arrays, POSITIONS), _find_key(arrays, NAMES)
     if table and arrays[table].ndim == 2:
-        if not listed:
+        if not names_key:
             raise RecordingError(f"{path}: the columns of {table!r} have no names: an array "
                                  "'joints' has to list them")
-        names = [str(key) for key in np.ravel(arrays[listed])]
-        if arrays[listed].dtype.kind != 'U' or len(names) != arrays[table].shape[1]:
-            raise RecordingError(f'{path}: {listed!r} are {arrays[listed].size} of type '
-                                 f'{arrays[listed].dtype}, where {table!r} has '
+        names = [str(key) for key in np.ravel(arrays[names_key])]
+        if arrays[names_key].dtype.kind != 'U' or len(names) != arrays[table].shape[1]:
+            raise RecordingError(f'{path}: {names_key!r} are {arrays[names_key].size} of type '
+                                 f'{arrays[names_key].dtype}, where {table!r} has '
                                  f'{arrays[table].shape[1]} columns to name')
-        used, angles = [table, listed], arrays[table]
+        keys, angles = [table, names_key], arrays[table]
     else:
         other = {*TIMES, *RATES, *UNITS, *NAMES}
-        size = arrays[time].size if (time := _named(arrays, TIMES)) else None
+        size = arrays[time].size if (time := _find_key(arrays, TIMES)) else None
         names = [name for name, array in arrays.items() if name.lower() not in other
                  and array.ndim == 1 and array.dtype.kind in 'fiu' and array.size > 1
                  and size in (None, array.size)]
         if not names:
             raise RecordingError(
                 f"{path}: neither 'positions' with 'joints' nor an array per joint, as long as "
-                f'the times; there are {abbreviate(_described(arrays), 20)}')
+                f'the times; there are {abbreviate(_descriptions(arrays), 20)}')
         if len({arrays[name].size for name in names}) > 1:
             raise RecordingError(f'{path}: arrays of different lengths, '
-                                 f'{abbreviate(_described({key: arrays[key] for key in names}))}')
-        used, angles = names, np.column_stack([arrays[name] for name in names])
+                                 f'{abbreviate(_descriptions({k: arrays[k] for k in names}))}')
+        keys, angles = names, np.column_stack([arrays[name] for name in names])
     if angles.dtype.kind not in 'fiu':
-        raise RecordingError(f'{path}: {used[0]!r} is of type {angles.dtype}, not of numbers')
+        raise RecordingError(f'{path}: {keys[0]!r} is of type {angles.dtype}, not of numbers')
     reserved = {key for key in arrays if key.lower() in (*TIMES, *RATES, *UNITS)}
-    left = [name for name in arrays if name not in used and name not in reserved]
-    if left:
-        notes.append(f'{pluralize(len(left), "array")} left out: {abbreviate(left)}')
+    ignored = [name for name in arrays if name not in keys and name not in reserved]
+    if ignored:
+        notes.append(f'{pluralize(len(ignored), "array")} left out: {abbreviate(ignored)}')
     return names, angles.astype(float)
 
 
-def _described(arrays: Mapping[str, np.ndarray]) -> list[str]:
+def _descriptions(arrays: Mapping[str, np.ndarray]) -> list[str]:
     return [f'{name} {array.shape}' for name, array in arrays.items()]
 
 
 def _scale(arrays: Mapping[str, np.ndarray], option: str | None, path: Path, notes: list[str]
            ) -> float:
     """Return the size of the unit in rad."""
-    name = _named(arrays, UNITS)
-    stated = str(arrays[name]) if name and arrays[name].ndim == 0 else None
-    for value in (stated, option):
+    name = _find_key(arrays, UNITS)
+    unit = str(arrays[name]) if name and arrays[name].ndim == 0 else None
+    for value in (unit, option):
         if value is not None and value not in ANGLE_UNITS:
             raise RecordingError(f'{path}: unit {value[:40]!r} is none of '
                                  f'{abbreviate(list(ANGLE_UNITS))}')
-    if stated and option and ANGLE_UNITS[stated] != ANGLE_UNITS[option]:
-        raise RecordingError(f'{path}: its angles are in {stated}, not {option}')
-    if not stated and not option:
+    if unit and option and ANGLE_UNITS[unit] != ANGLE_UNITS[option]:
+        raise RecordingError(f'{path}: its angles are in {unit}, not {option}')
+    if not unit and not option:
         notes.append("no array 'unit': the angles are taken to be in rad")
-    return ANGLE_UNITS[stated or option or 'rad']
+    return ANGLE_UNITS[unit or option or 'rad']
 
 
 def _stamps(arrays: Mapping[str, np.ndarray], fps: str | float | None, count: int, path: Path
             ) -> np.ndarray:
     """Return stamps in ns, shape (count,)."""
-    if name := _named(arrays, TIMES):
+    if name := _find_key(arrays, TIMES):
         times = arrays[name]
         if times.shape != (count,) or times.dtype.kind not in 'fiu':
             raise RecordingError(f'{path}: {name!r} of shape {times.shape} and type '
@@ -185,7 +185,7 @@ def _stamps(arrays: Mapping[str, np.ndarray], fps: str | float | None, count: in
             raise RecordingError(f'{path}: {name!r} has values that are no times in s, such as '
                                  f'{seconds[~(np.abs(seconds) < MAX_TIME)][0]:g}')
         return np.rint(seconds * 1e9).astype(np.int64)
-    if name := _named(arrays, RATES):
+    if name := _find_key(arrays, RATES):
         if arrays[name].size != 1 or arrays[name].dtype.kind not in 'fiu':
             raise RecordingError(f'{path}: {name!r} is not one number')
         fps = float(arrays[name].item())

@@ -25,6 +25,7 @@ from pathlib import Path
 import re
 
 from cpg_ros.fitting.recordings.csv_reader import read_csv
+from cpg_ros.fitting.recordings.downsampling import pluralize
 from cpg_ros.fitting.recordings.markers import (
     joint_recording,
     LENGTH_UNITS,
@@ -45,7 +46,6 @@ from cpg_ros.fitting.recordings.recording import (
     UNIT,
 )
 from cpg_ros.fitting.recordings.tables import number_rows, opened, preamble, remaining_lines
-from cpg_ros.fitting.recordings.thinned import pluralize
 import numpy as np
 
 # Markers out of TRC files (track row column), as OpenSim and Motion Analysis write them.
@@ -89,12 +89,12 @@ def trc_markers(path: str | Path) -> Markers:
         raise RecordingError(f"{path}, line 4: the columns have to be 'Frame#', 'Time' and the "
                              f'markers, with tabs between, not {abbreviate(cells)}')
     labels = [cell for cell in cells[2:] if cell]
-    stated = facts.get('NumMarkers')
+    count = facts.get('NumMarkers')
     rows, notes = number_rows(rest, ['Frame#', 'Time', *(
         f'{label} {axis}' for label in labels for axis in 'XYZ')], '\t', path, 6)
-    if stated != str(len(labels)):
+    if count != str(len(labels)):
         notes.append(f'{pluralize(len(labels), "marker")}, where NumMarkers is '
-                     f'{stated or "missing"}')
+                     f'{count or "missing"}')
     if not len(rows):
         raise RecordingError(f'{path}: no rows')
     if facts.get('NumFrames') != str(len(rows)):
@@ -148,7 +148,7 @@ def read_mot(path: str | Path, unit: str | None = None, joints: Sequence[str] = 
 
     """
     path = Path(path)
-    declared, columns, rows = _header(path)
+    header, columns, rows = _header(path)
     # Speeds of states are called like their coordinate, with '_u' behind.
     speeds = {f'{column}_u' for column in columns}
     angles = {column: _joint(column) for column in columns
@@ -165,20 +165,21 @@ def read_mot(path: str | Path, unit: str | None = None, joints: Sequence[str] = 
     recording = read_csv(path, unit, progress=progress, joints=[*(
         next(column for column, joint in angles.items() if joint == name) for name in names),
         *body.values()])
-    scale = ANGLE_UNITS[declared or unit or 'rad']
+    scale = ANGLE_UNITS[header or unit or 'rad']
     place = dict(zip(body, recording.positions[:, len(names):].T / scale, strict=True))
     recording = replace(recording, joints=tuple(names),
                         positions=recording.positions[:, :len(names)],
                     body=np.column_stack([place.get(axis, 0.0 * place['y']) for axis in 'xzy'])
                     if 'y' in place and np.isfinite([*place.values()]).all() else None)
     notes: list[str] = []
-    if declared is None and unit is None:
+    if header is None and unit is None:
         notes.append("the header has no 'inDegrees': the angles are taken to be in rad")
-    left = [column for column in columns if column not in angles]
-    if left:
-        notes.append(f'{pluralize(len(left), "column")} left out, no angles: {abbreviate(left)}')
-    if rows is not None and (there := len(recording.times)) < rows:
-        notes.append(f'{there} rows, where the header states {rows}')
+    ignored = [column for column in columns if column not in angles]
+    if ignored:
+        notes.append(f'{pluralize(len(ignored), "column")} left out, no angles: '
+                     f'{abbreviate(ignored)}')
+    if rows is not None and (num_rows := len(recording.times)) < rows:
+        notes.append(f'{num_rows} rows, where the header states {rows}')
     return replace(recording, notes=(*notes, *recording.notes))
 
 
@@ -194,13 +195,13 @@ def _header(path: Path) -> tuple[str | None, list[str], int | None]:
         header = preamble(first, file) if first else None
     if header is None:
         raise RecordingError(f"{path}: not a file of OpenSim: it has no line 'endheader'")
-    line, _, unit, stated = header
+    line, _, unit, counts = header
     columns = [name.strip() for name in re.split(r'[\t,;]' if '\t' in line else r'\s+', line)]
     columns = [name for name in columns if name]
     if not columns or columns[0].lower() != 'time':
         raise RecordingError(f"{path}: the first column has to be 'time', not "
                              f'{abbreviate(columns[:1]) or "missing"}')
-    return unit, columns[1:], stated
+    return unit, columns[1:], counts
 
 
 MOT = RecordingFormat(

@@ -32,7 +32,7 @@ from typing import Any
 
 from cpg_ros.common.errors import needed
 from cpg_ros.fitting.recordings.markers import joint_recording, Markers, SEGMENTS
-from cpg_ros.fitting.recordings.reader_process import read_apart, UnreadableFile
+from cpg_ros.fitting.recordings.reader_process import read_in_process, UnreadableFile
 from cpg_ros.fitting.recordings.recording import (
     abbreviate,
     JOINTS,
@@ -83,18 +83,18 @@ class _Poses:
     def markers(self, fps: str | float | None, individual: str | None) -> Markers:
         """Return the markers of one animal."""
         animals = list(dict.fromkeys(one[0] for one in self.columns if one))
-        animal = _chosen(individual, animals, self.path)
+        animal = _select_individual(individual, animals, self.path)
         index: dict[str, dict[str, int]] = {}
         for k, one in enumerate(self.columns):
             if one and one[0] == animal:
-                own = index.setdefault(one[1], {})
-                if one[2] in own:
+                columns = index.setdefault(one[1], {})
+                if one[2] in columns:
                     raise RecordingError(f'{self.path}: two columns {one[2]!r} of marker '
                                          f'{one[1]!r}')
-                own[one[2]] = k
-        flat = not any('z' in own for own in index.values())
+                columns[one[2]] = k
+        flat = not any('z' in columns for columns in index.values())
         axes = 'xy' if flat else 'xyz'
-        names = tuple(name for name, own in index.items() if set(axes) <= set(own))
+        names = tuple(name for name, columns in index.items() if set(axes) <= set(columns))
         if not names:
             raise RecordingError(f'{self.path}: no marker has columns {abbreviate(list(axes))}')
         if not len(self.rows):
@@ -144,17 +144,17 @@ def pose_markers(path: str | Path, fps: str | float | None, individual: str | No
         raise RecordingError(f'{path}: a project of SLEAP: export its analysis as HDF5 or CSV')
     poses = _poses_of_hdf5(path) if path.suffix == '.h5' else _poses_of_table(path, individual)
     # Only the requested track was read, and it has no name.
-    tracked = {key[0] for key in poses.columns if key} == {''}
-    return poses.markers(fps, None if tracked else individual)
+    unnamed = {key[0] for key in poses.columns if key} == {''}
+    return poses.markers(fps, None if unnamed else individual)
 
 
 def _poses_of_hdf5(path: Path) -> _Poses:
     needed('h5py')
     try:
-        arrays = read_apart(hdf5_arrays, path)
+        arrays = read_in_process(hdf5_arrays, path)
     except (UnreadableFile, OSError) as error:
-        why = ' '.join(str(error).split()) or type(error).__name__
-        raise RecordingError(f'{path}: not a readable HDF5 file of poses: {why[:200]}'
+        reason = ' '.join(str(error).split()) or type(error).__name__
+        raise RecordingError(f'{path}: not a readable HDF5 file of poses: {reason[:200]}'
                              ) from error
     columns = [tuple(column) for column in json.loads(str(arrays['columns']))]
     return _Poses(path, columns, arrays['rows'], arrays['frames'])
@@ -266,22 +266,22 @@ def _poses_of_table(path: Path, individual: str | None) -> _Poses:
         at = first.index(TRACK_COLUMN)
         tracks = [_cells(line, path, k)[at] for k, line in enumerate(filter(str.strip, lines), 2)
                   ][:len(rows)]
-        animal = _chosen(individual, list(dict.fromkeys(tracks)), path)
+        animal = _select_individual(individual, list(dict.fromkeys(tracks)), path)
         rows = rows[[track == animal for track in tracks]]
-        seen, count = np.unique(rows[:, frame], return_counts=True)
+        numbers, count = np.unique(rows[:, frame], return_counts=True)
         if (count > 1).any():
-            raise RecordingError(f'{path}: frame {seen[np.argmax(count > 1)]:g} is there twice: '
-                                 'animals without tracks cannot be told apart')
+            raise RecordingError(f'{path}: frame {numbers[np.argmax(count > 1)]:g} occurs twice: '
+                                 'animals without tracks cannot be distinguished')
     return _Poses(path, columns, rows, rows[:, frame], notes)
 
 
-def _chosen(individual: str | None, there: Sequence[str], path: Path) -> str:
+def _select_individual(individual: str | None, names: Sequence[str], path: Path) -> str:
     """Return the animal to read; it must be named if there are several."""
-    if (individual is None and len(there) < 2) or individual in there:
-        return individual if individual is not None else (*there, '')[0]
+    if (individual is None and len(names) < 2) or individual in names:
+        return individual if individual is not None else (*names, '')[0]
     lacking = '' if individual is None else f'no individual {individual!r}; '
-    named = abbreviate([one for one in there if one])
-    raise RecordingError(f'{path}: {lacking}there are {named or "none with names"}: name one '
+    choices = abbreviate([one for one in names if one])
+    raise RecordingError(f'{path}: {lacking}there are {choices or "none with names"}: name one '
                          '(individual)')
 
 

@@ -42,7 +42,7 @@ class UnreadableFile(CpgError):
     """A library cannot read a file; the message gives the reason."""
 
 
-def read_apart(reader: Callable[[str], dict[str, Any]], path: Path) -> dict[str, np.ndarray]:
+def read_in_process(reader: Callable[[str], dict[str, Any]], path: Path) -> dict[str, np.ndarray]:
     """Read a file in a process with limits on memory and time.
 
     Args:
@@ -56,7 +56,7 @@ def read_apart(reader: Callable[[str], dict[str, Any]], path: Path) -> dict[str,
     """
     size = path.stat().st_size
     package = str(Path(__file__).resolve().parents[3])
-    others = os.environ.get('PYTHONPATH', '')
+    search_path = os.environ.get('PYTHONPATH', '')
     seconds = MAX_CPU_TIME + TIME_PER_BYTE * size
     with TemporaryDirectory(prefix='cpg_ros-') as folder:
         out = Path(folder, 'arrays.npz')
@@ -64,16 +64,16 @@ def read_apart(reader: Callable[[str], dict[str, Any]], path: Path) -> dict[str,
                    os.path.abspath(path), str(out),
                    str(round(MAX_MEMORY + MEMORY_PER_BYTE * size)), str(round(seconds))]
         environment = os.environ | {'OPENBLAS_NUM_THREADS': '1', 'PYTHONPATH': os.pathsep.join(
-            filter(None, (package, others)))}
+            filter(None, (package, search_path)))}
         try:
             # A process that waits takes no time of the processor, but time.
-            ended = subprocess.run(
+            result = subprocess.run(
                 command, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
                 stderr=subprocess.PIPE, timeout=6.0 * seconds)
         except subprocess.TimeoutExpired as error:
             raise UnreadableFile(f'not read within {6.0 * seconds:.0f} s') from error
-        if ended.returncode:
-            raise UnreadableFile(_reason(ended.returncode, ended.stderr, seconds))
+        if result.returncode:
+            raise UnreadableFile(_reason(result.returncode, result.stderr, seconds))
         with np.load(out, allow_pickle=False) as arrays:
             return dict(arrays)
 

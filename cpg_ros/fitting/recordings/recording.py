@@ -26,12 +26,12 @@ import re
 
 from cpg_ros.common.command_line import printable
 from cpg_ros.common.errors import CpgError, ShortRepr
-from cpg_ros.fitting.recordings.thinned import (
+from cpg_ros.fitting.recordings.downsampling import (
+    Downsampler,
     drop_outlier_positions,
     drop_outlier_stamps,
     Part,
     pluralize,
-    Thinned,
 )
 import numpy as np
 
@@ -148,8 +148,8 @@ class Recording(ShortRepr):
         first = float(times[0]) if times.size else 0.0
         loads = self.loads
         if loads is not None:
-            held = (loads.times >= begin) & (loads.times <= end)
-            loads = replace(loads, times=loads.times[held] - first, loads=loads.loads[held])
+            inside = (loads.times >= begin) & (loads.times <= end)
+            loads = replace(loads, times=loads.times[inside] - first, loads=loads.loads[inside])
         return replace(self, times=times - first, positions=self.positions[within],
                        start=self.start + first, loads=loads,
                        body=None if self.body is None else self.body[within])
@@ -174,26 +174,26 @@ def refuse_stand_in(path: Path, head: bytes) -> None:
                              f'{path.name} --dst {path.stem}"')
 
 
-def require(names: Sequence[str], there: Sequence[str], source: str) -> None:
+def require(names: Sequence[str], available: Sequence[str], source: str) -> None:
     """Check that joints exist, and that none is named twice.
 
     Raises:
         RecordingError: one is missing or named twice.
 
     """
-    unknown = [name for name in names if name not in there]
+    unknown = [name for name in names if name not in available]
     if unknown:
         raise RecordingError(f'{source}: no {joint_list(unknown)}; there are '
-                             f'{abbreviate(there, 40)}')
-    again = [name for k, name in enumerate(names) if name in names[:k]]
-    if again:
-        raise RecordingError(f'{source}: {joint_list(again[:1])} is named twice')
+                             f'{abbreviate(available, 40)}')
+    duplicates = [name for k, name in enumerate(names) if name in names[:k]]
+    if duplicates:
+        raise RecordingError(f'{source}: {joint_list(duplicates[:1])} is named twice')
 
 
-def abbreviate(names: Sequence[str], most: int = 6) -> str:
+def abbreviate(names: Sequence[str], limit: int = 6) -> str:
     """Return names in quotes, only the first ones if they are many."""
-    shown = ', '.join(repr(name) for name in names[:most])
-    return shown + (f' and {len(names) - most} more' if len(names) > most else '')
+    text = ', '.join(repr(name) for name in names[:limit])
+    return text + (f' and {len(names) - limit} more' if len(names) > limit else '')
 
 
 def joint_list(joints: Sequence[str]) -> str:
@@ -223,12 +223,12 @@ def matching(patterns: Sequence[str], names: Sequence[str], source: str) -> list
     return list(dict.fromkeys(matches if patterns else names))
 
 
-def unwrapped(angles: np.ndarray) -> np.ndarray:
+def unwrap(angles: np.ndarray) -> np.ndarray:
     """Return angles, rad, shape (n, joints), without jumps by whole turns; nan where missing."""
     angles = angles.copy()
     for column in angles.T:
-        there = np.isfinite(column)
-        column[there] = np.unwrap(column[there])
+        finite = np.isfinite(column)
+        column[finite] = np.unwrap(column[finite])
     return angles
 
 
@@ -249,17 +249,17 @@ def recording_of(path: Path, stamps: np.ndarray, names: Sequence[str], angles: n
 
     """
     require(names, names, str(path))
-    recording = merged([(stamps, names, angles)], printable(str(path)),
+    recording = merge_chunks([(stamps, names, angles)], printable(str(path)),
                    matching(joints, names, str(path)))
     return replace(recording, notes=(*map(printable, notes), *recording.notes))
 
 
-def merged(chunks: Iterable[Chunk], source: str, joints: Sequence[str] = ()) -> Recording:
+def merge_chunks(chunks: Iterable[Chunk], source: str, joints: Sequence[str] = ()) -> Recording:
     """Join samples, each of all joints or of some, into one recording.
 
     Samples of different joints with the same stamp become one; a joint without a sample at a stamp
     is nan there. Among samples of a joint with the same stamp, the first is kept. Values that are
-    not finite count as missing. A long recording is downsampled (see `thinned`).
+    not finite count as missing. A long recording is downsampled (see `downsampling`).
 
     Args:
         chunks: in the order of arrival, for each set of names; see `Chunk`.
@@ -276,49 +276,49 @@ def merged(chunks: Iterable[Chunk], source: str, joints: Sequence[str] = ()) -> 
     if not names:
         raise RecordingError(f'{source}: no samples')
     require(joints, names, source)
-    wanted_names = tuple(joints) or tuple(names)
-    parts, notes = _parts(groups, wanted_names)
-    parts, astray = drop_outlier_stamps(parts)
-    notes += astray
+    columns = tuple(joints) or tuple(names)
+    parts, notes = _parts(groups, columns)
+    parts, stamp_notes = drop_outlier_stamps(parts)
+    notes += stamp_notes
     origin = min(int(stamps.min()) for stamps, _, _ in parts)
-    received = sum(len(stamps) for stamps, _, _ in parts)
+    num_samples = sum(len(stamps) for stamps, _, _ in parts)
     # What is no longer needed goes at once: a long recording is large.
-    parts, late, again = _in_order(parts, origin)
-    far = drop_outlier_positions(parts, len(wanted_names))
-    times, positions, odd, twice = _one_table(parts, len(wanted_names))
+    parts, num_late, duplicates = _sort_parts(parts, origin)
+    outliers = drop_outlier_positions(parts, len(columns))
+    times, positions, invalid, copies = _one_table(parts, len(columns))
     del parts
-    if late:
-        notes.append(f'{pluralize(late, "sample")} out of order, sorted by stamp')
-    if again + twice:
-        notes.append(f'{pluralize(again + twice, "duplicate")} of a stamp, the first is kept')
-    odd -= far
-    notes += [f'joint {wanted_names[k]!r}: {pluralize(int(odd[k]), "position")} not a finite '
-              'number' for k in np.flatnonzero(odd)]
-    notes += [f'joint {wanted_names[k]!r}: {pluralize(int(far[k]), "position")} far beyond the '
-              'others, left out' for k in np.flatnonzero(far)]
-    there = ~np.isnan(positions)
-    silent = [name for name, any_there in zip(wanted_names, there.any(axis=0), strict=True)
-              if not any_there]
-    if silent:
-        raise RecordingError(f'{source}: no finite position of {joint_list(silent)} in '
-                             f'{pluralize(received, "sample")}; name the joints to take to do '
+    if num_late:
+        notes.append(f'{pluralize(num_late, "sample")} out of order, sorted by stamp')
+    if count := duplicates + copies:
+        notes.append(f'{pluralize(count, "duplicate")} of a stamp, the first is kept')
+    invalid -= outliers
+    notes += [f'joint {columns[k]!r}: {pluralize(int(invalid[k]), "position")} not a finite '
+              'number' for k in np.flatnonzero(invalid)]
+    notes += [f'joint {columns[k]!r}: {pluralize(int(outliers[k]), "position")} far beyond the '
+              'others, left out' for k in np.flatnonzero(outliers)]
+    valid = ~np.isnan(positions)
+    empty = [name for name, has_values in zip(columns, valid.any(axis=0), strict=True)
+             if not has_values]
+    if empty:
+        raise RecordingError(f'{source}: no finite position of {joint_list(empty)} in '
+                             f'{pluralize(num_samples, "sample")}; name the joints to take to do '
                              'without')
-    measured = there.any(axis=1)
-    if not measured.all():
-        times, positions, there = times[measured], positions[measured], there[measured]
+    rows = valid.any(axis=1)
+    if not rows.all():
+        times, positions, valid = times[rows], positions[rows], valid[rows]
     if len(times) < 2:
-        raise RecordingError(f'{source}: {pluralize(received, "sample")}, all at stamp '
+        raise RecordingError(f'{source}: {pluralize(num_samples, "sample")}, all at stamp '
                              f'{origin / 1e9:.9f} s: no time passes')
-    notes += _missing(wanted_names, there)
-    notes += _intervals(wanted_names, times, there)
-    return Recording(wanted_names, times - times[0], positions, source,
+    notes += _missing(columns, valid)
+    notes += _intervals(columns, times, valid)
+    return Recording(columns, times - times[0], positions, source,
                      origin / 1e9 + float(times[0]), tuple(notes))
 
 
 def _groups(chunks: Iterable[Chunk], source: str
-            ) -> dict[tuple[str, ...], Thinned]:
+            ) -> dict[tuple[str, ...], Downsampler]:
     """Sort chunks by the joints they hold."""
-    groups: dict[tuple[str, ...], Thinned] = {}
+    groups: dict[tuple[str, ...], Downsampler] = {}
     for stamps, names, positions in chunks:
         stamps, positions = np.asarray(stamps), np.asarray(positions, float)
         if stamps.ndim != 1 or positions.shape != (len(stamps), len(names)):
@@ -328,113 +328,113 @@ def _groups(chunks: Iterable[Chunk], source: str
             continue
         if not np.issubdtype(stamps.dtype, np.integer):
             raise RecordingError(f'{source}: stamps must be whole nanoseconds, not {stamps.dtype}')
-        far = np.abs(stamps.astype(float)) > MAX_TIME * 1e9
-        if far.any():
-            raise RecordingError(f'{source}: stamp of {float(stamps[far][0]) / 1e9:.6g} s')
+        beyond = np.abs(stamps.astype(float)) > MAX_TIME * 1e9
+        if beyond.any():
+            raise RecordingError(f'{source}: stamp of {float(stamps[beyond][0]) / 1e9:.6g} s')
         if len(set(names)) < len(names):
             require(names, names, source)
-        groups.setdefault(tuple(names), Thinned()).add(stamps.astype(np.int64), positions)
+        groups.setdefault(tuple(names), Downsampler()).add(stamps.astype(np.int64), positions)
     return groups
 
 
-def _parts(groups: dict[tuple[str, ...], Thinned], wanted: tuple[str, ...]
+def _parts(groups: dict[tuple[str, ...], Downsampler], names: tuple[str, ...]
            ) -> tuple[list[Part], list[str]]:
     """Take the wanted joints' samples out of groups; return them, and notes on downsampling."""
     parts, notes = [], []
     for group in list(groups):
-        columns = [k for k, name in enumerate(group) if name in wanted]
+        columns = [k for k, name in enumerate(group) if name in names]
         if columns:
             samples = groups.pop(group)
-            stamps, positions = samples.taken()
+            stamps, positions = samples.flush()
             notes += [samples.note] if samples.note else []
-            parts.append((stamps, [wanted.index(group[k]) for k in columns],
+            parts.append((stamps, [names.index(group[k]) for k in columns],
                           positions[:, columns] if len(columns) < len(group) else positions))
     return parts, notes
 
 
-def _in_order(parts: list[Part], origin: int) -> tuple[list[Part], int, int]:
+def _sort_parts(parts: list[Part], origin: int) -> tuple[list[Part], int, int]:
     """Sort samples by time, s from an origin in ns; keep the first of equal times.
 
     Returns:
         The samples, and how many were late and how many were duplicates.
 
     """
-    ordered, late, again = [], 0, 0
+    parts_in_order, num_late, duplicates = [], 0, 0
     for stamps, columns, positions in parts:
         # Duplicates are found in float64, where two stamps can be one a week into a recording.
         times = (stamps - origin) / 1e9
         steps = np.diff(times)
         if (steps < 0.0).any():
-            late += int((times < np.maximum.accumulate(times)).sum())
+            num_late += int((times < np.maximum.accumulate(times)).sum())
             order = np.argsort(times, kind='stable')
             times, positions = times[order], positions[order]
             steps = np.diff(times)
         if (steps == 0.0).any():
-            fresh = np.append(True, steps > 0.0)
-            again += int((~fresh).sum())
-            times, positions = times[fresh], positions[fresh]
-        ordered.append((times, columns, positions))
-    return ordered, late, again
+            first = np.append(True, steps > 0.0)
+            duplicates += int((~first).sum())
+            times, positions = times[first], positions[first]
+        parts_in_order.append((times, columns, positions))
+    return parts_in_order, num_late, duplicates
 
 
 def _one_table(parts: list[Part], width: int
                ) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
     """Return times, positions, number of odd values by joint, and number of repeated samples."""
-    odd, twice = np.zeros(width, int), 0
+    invalid, copies = np.zeros(width, int), 0
     for _, columns, positions in parts:
-        strange = ~np.isfinite(positions)
-        if strange.any():
-            odd[columns] += strange.sum(axis=0)
-            positions[strange] = np.nan
+        mask = ~np.isfinite(positions)
+        if mask.any():
+            invalid[columns] += mask.sum(axis=0)
+            positions[mask] = np.nan
     times, columns, positions = parts[0]
     if len(parts) == 1 and columns == list(range(width)):
-        return times, positions, odd, twice
+        return times, positions, invalid, copies
     times = np.unique(np.concatenate([times for times, _, _ in parts]))
     table = np.full((len(times), width), np.nan)
-    for own, columns, positions in parts:
-        cells = np.searchsorted(times, own)[:, None], np.array(columns)
+    for part_times, columns, positions in parts:
+        cells = np.searchsorted(times, part_times)[:, None], np.array(columns)
         before = table[cells]
         first = np.isnan(before)
-        twice += int((~first & ~np.isnan(positions)).any(axis=1).sum())
+        copies += int((~first & ~np.isnan(positions)).any(axis=1).sum())
         table[cells] = np.where(first, positions, before)
-    return times, table, odd, twice
+    return times, table, invalid, copies
 
 
-def _missing(joints: tuple[str, ...], there: np.ndarray) -> list[str]:
+def _missing(joints: tuple[str, ...], valid: np.ndarray) -> list[str]:
     """Name the joints that have fewer samples than others."""
-    counts = there.sum(axis=0)
-    most = counts.max()
+    counts = valid.sum(axis=0)
+    largest = counts.max()
     return [f'{joint_list([joints[k] for k in np.flatnonzero(counts == count)])}: '
-            f'{pluralize(int(count), "sample")} where others have {most}'
-            for count in np.unique(counts[counts < most])]
+            f'{pluralize(int(count), "sample")} where others have {largest}'
+            for count in np.unique(counts[counts < largest])]
 
 
-def _intervals(joints: tuple[str, ...], times: np.ndarray, there: np.ndarray) -> list[str]:
+def _intervals(joints: tuple[str, ...], times: np.ndarray, valid: np.ndarray) -> list[str]:
     """Report dropouts and jitter of the intervals, for joints sampled together."""
-    together: dict[bytes, list[int]] = {}
-    if there.all():
-        together[b''] = list(range(len(joints)))
+    groups: dict[bytes, list[int]] = {}
+    if valid.all():
+        groups[b''] = list(range(len(joints)))
     else:
         for k in range(len(joints)):
-            together.setdefault(there[:, k].tobytes(), []).append(k)
+            groups.setdefault(valid[:, k].tobytes(), []).append(k)
     notes = []
-    for columns in together.values():
-        own = times if there.all() else times[there[:, columns[0]]]
-        if len(own) < 3:
+    for columns in groups.values():
+        joint_times = times if valid.all() else times[valid[:, columns[0]]]
+        if len(joint_times) < 3:
             continue
-        steps = np.diff(own)
+        steps = np.diff(joint_times)
         usual = float(np.median(steps))
         long = steps > DROPOUT_RATIO * usual
-        who = '' if len(together) == 1 else f'{joint_list([joints[k] for k in columns])}: '
+        prefix = '' if len(groups) == 1 else f'{joint_list([joints[k] for k in columns])}: '
         if long.any():
-            lost = int((np.rint(steps[long] / usual) - 1).sum())
-            worst = int(np.argmax(steps))
-            notes.append(f'{who}{pluralize(int(long.sum()), "dropout")}, about '
-                         f'{pluralize(lost, "sample")} of {len(own) + lost}, the longest '
-                         f'{steps[worst]:.4g} s at {own[worst]:.4g} s')
+            num_lost = int((np.rint(steps[long] / usual) - 1).sum())
+            longest = int(np.argmax(steps))
+            notes.append(f'{prefix}{pluralize(int(long.sum()), "dropout")}, about '
+                         f'{pluralize(num_lost, "sample")} of {len(joint_times) + num_lost}, the '
+                         f'longest {steps[longest]:.4g} s at {joint_times[longest]:.4g} s')
         off = int((np.abs(steps - usual)[~long] > JITTER_RATIO * usual).sum())
         if off:
-            notes.append(f'{who}{off} of {len(steps)} intervals jitter by more than '
+            notes.append(f'{prefix}{off} of {len(steps)} intervals jitter by more than '
                          f'{JITTER_RATIO:.0%} of the usual {usual:.4g} s')
     return notes
 
@@ -491,25 +491,25 @@ def repeat_stride(recording: Recording, duration: float = 0.0) -> Recording:
     if not 0.0 <= duration < math.inf:
         raise RecordingError(f'{recording.source}: a stride cannot last {duration:g} s')
     gaps, closed = _seam(recording)
-    worst = int(np.argmax(gaps))
-    if gaps[worst] > MAX_DECLARED_GAP:
+    largest = int(np.argmax(gaps))
+    if gaps[largest] > MAX_DECLARED_GAP:
         raise RecordingError(f'{recording.source}: not one stride: '
-                             f'{joint_list(recording.joints[worst:worst + 1])} ends '
-                             f'{gaps[worst]:.0%} of its range from where it begins')
+                             f'{joint_list(recording.joints[largest:largest + 1])} ends '
+                             f'{gaps[largest]:.0%} of its range from where it begins')
     count = len(recording.times) - closed
-    own = length if closed else length + step
-    scale = duration / own if duration else 1.0
-    starts = own * np.arange(NUM_COPIES)[:, None]
+    span = length if closed else length + step
+    scale = duration / span if duration else 1.0
+    starts = span * np.arange(NUM_COPIES)[:, None]
     loads = recording.loads
     if loads is not None:
-        held = loads.times < own
-        loads = replace(loads, times=scale * (starts + loads.times[held]).ravel(),
-                        loads=np.tile(loads.loads[held], (NUM_COPIES, 1)))
+        inside = loads.times < span
+        loads = replace(loads, times=scale * (starts + loads.times[inside]).ravel(),
+                        loads=np.tile(loads.loads[inside], (NUM_COPIES, 1)))
     return replace(
         recording, times=scale * (starts + recording.times[:count]).ravel(), loads=loads,
-        positions=np.tile(recording.positions[:count], (NUM_COPIES, 1)), cycle=scale * own,
+        positions=np.tile(recording.positions[:count], (NUM_COPIES, 1)), cycle=scale * span,
         body=None if recording.body is None else np.tile(recording.body[:count], (NUM_COPIES, 1)),
-        notes=(*recording.notes, f'one stride, of {scale * own:.4g} s, which is repeated: it '
+        notes=(*recording.notes, f'one stride, of {scale * span:.4g} s, which is repeated: it '
                'does not tell how strides differ'))
 
 
@@ -536,10 +536,10 @@ def _seam(recording: Recording) -> tuple[np.ndarray, bool]:
     spans = np.nanmax(x, axis=0) - np.nanmin(x, axis=0)
     # A joint that hardly moves has no gap.
     spans = np.maximum(spans, 0.05 * spans.max())
-    again, following = (np.nan_to_num(np.abs(end - x[0]) / spans)
-                        for end in (x[-1], 2.0 * x[-1] - x[-2]))
-    closed = bool(again.sum() <= following.sum())
-    return (again if closed else following), closed
+    from_start, following = (np.nan_to_num(np.abs(end - x[0]) / spans)
+                             for end in (x[-1], 2.0 * x[-1] - x[-2]))
+    closed = bool(from_start.sum() <= following.sum())
+    return (from_start if closed else following), closed
 
 
 # The declaration of a format of recordings; each format is one file that ends in one of these.

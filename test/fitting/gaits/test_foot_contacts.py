@@ -53,9 +53,9 @@ def recorded(duty, seed=0, rate=100.0, bounce=False):
 def test_walk_and_run_are_told_apart_by_the_loads(duty, gait, bounce):
     recording, loads = recorded(duty, bounce=bounce)
     without = find_stride(recording, LEGS, NETWORKS['biped'])
-    assert set(without.alike) == {'walk', 'run'} and without.confidence < 0.6
+    assert set(without.candidates) == {'walk', 'run'} and without.confidence < 0.6
     found = find_stride(recording, LEGS, NETWORKS['biped'], loads=loads)
-    assert found.gait == gait and found.alike == (gait,) and found.confidence > 0.95
+    assert found.gait == gait and found.candidates == (gait,) and found.confidence > 0.95
     assert found.contacts.flight == pytest.approx(max(0.0, 1.0 - 2.0 * duty), abs=0.04)
     for strides in leg_strides(recording, LEGS, found):
         assert strides.by_contacts and len(strides.begins) >= 10
@@ -103,7 +103,7 @@ def test_between_walk_and_run_it_cannot_tell():
     recording, loads = recorded(0.44)
     found = find_stride(recording, LEGS, NETWORKS['biped'], loads=loads)
     assert 0.1 < found.contacts.flight < 0.15
-    assert set(found.alike) == {'walk', 'run'} and found.verdict == 'walk or run: cannot tell'
+    assert set(found.candidates) == {'walk', 'run'} and found.verdict == 'walk or run: cannot tell'
 
 
 def test_feet_that_are_never_lifted_stand_and_few_samples_tell_nothing():

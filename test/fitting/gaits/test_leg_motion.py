@@ -101,6 +101,6 @@ def test_no_posture_tells_walk_from_run(swing, places, sense, offset, scale):
     found = stride_of(lambda turn, leg: 0.2 + offset + scale * swing * np.cos(turn + 0.3),
                       lambda turn, leg: sense * (0.08 + offset + scale * bumps(turn, *places)),
                       {'left': 0.0, 'right': 0.5}, Biped)
-    assert set(found.alike) == {'walk', 'run'} and found.confidence <= 0.5
+    assert set(found.candidates) == {'walk', 'run'} and found.confidence <= 0.5
     assert found.verdict == 'walk or run: cannot tell'
     assert any('walk or run: cannot tell' in issue and '--gait' in issue for issue in found.issues)

@@ -166,7 +166,7 @@ def test_a_renamed_storage_file_is_read_with_its_metadata(tmp_path, storage):
     file.rename(path / f'renamed{file.suffix}')
     recording = read_bag(path)
     assert np.array_equal(recording.positions, angles)
-    assert f"metadata.yaml names '{name}', which is not there" in recording.notes[0]
+    assert f"metadata.yaml names '{name}', which is missing" in recording.notes[0]
 
 
 @pytest.mark.parametrize(('name', 'content', 'words'), [

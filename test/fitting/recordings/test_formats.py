@@ -26,7 +26,7 @@ from cpg_ros.fitting.inversion.results import found
 from cpg_ros.fitting.recordings.formats import FORMATS
 from cpg_ros.fitting.recordings.recording import (
     JOINTS,
-    merged,
+    merge_chunks,
     Option,
     RecordingError,
     RecordingFormat,
@@ -85,7 +85,7 @@ def read_steps(path, joints=(), rate=None, progress=True):
         raise RecordingError(f'{path}: {error}') from error
     rows = np.array(tree['angles'])
     stamps = np.round(1e9 / float(rate or 50) * np.arange(len(rows))).astype(np.int64)
-    return merged([(stamps, tree['joints'], rows)], str(path), joints)
+    return merge_chunks([(stamps, tree['joints'], rows)], str(path), joints)
 
 
 STEPS = RecordingFormat('steps', 'a file of steps', 'rows of angles', 'JSON', read_steps,

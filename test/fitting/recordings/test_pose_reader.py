@@ -99,7 +99,7 @@ def test_sleap(tmp_path):
     with pytest.raises(RecordingError, match="there are 'one', 'two': name one"):
         pose_markers(path, 20)
     path.write_text(SLEAP.replace('two', '').replace('one', ''))
-    with pytest.raises(RecordingError, match='frame 0 is there twice: animals without'):
+    with pytest.raises(RecordingError, match='frame 0 occurs twice: animals without'):
         pose_markers(path, 20)
 
 

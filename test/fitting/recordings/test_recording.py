@@ -14,7 +14,7 @@
 
 """Recordings merged from chunks, against a dictionary filled sample by sample."""
 
-from cpg_ros.fitting.recordings.recording import merged, Recording, RecordingError
+from cpg_ros.fitting.recordings.recording import merge_chunks, Recording, RecordingError
 from depth import examples
 from hypothesis import given
 from hypothesis import strategies as st
@@ -60,9 +60,9 @@ def test_each_joint_has_its_first_position_at_each_stamp(made):
     heard = {name for row in first.values() for name in row}
     if len(first) < 2 or heard != set(joints):
         with pytest.raises(RecordingError):
-            merged(made, 'live')
+            merge_chunks(made, 'live')
         return
-    recording = merged(made, 'live')
+    recording = merge_chunks(made, 'live')
     stamps = sorted(first)
     assert recording.joints == joints
     assert np.allclose(recording.times, (np.array(stamps) - stamps[0]) / 1e9, rtol=0, atol=1e-12)
@@ -79,14 +79,14 @@ def test_the_input_is_left_alone():
     stamps, positions = ramp()
     positions[3, 1] = np.inf
     copies = stamps.copy(), positions.copy()
-    merged([(stamps, JOINTS, positions)], 'live')
+    merge_chunks([(stamps, JOINTS, positions)], 'live')
     assert np.array_equal(stamps, copies[0])
     assert np.array_equal(positions, copies[1])
 
 
 def test_a_clean_recording_has_no_notes():
     stamps, positions = ramp()
-    recording = merged([(stamps[:40], JOINTS, positions[:40]),
+    recording = merge_chunks([(stamps[:40], JOINTS, positions[:40]),
                         (stamps[40:], JOINTS, positions[40:])], 'live')
     assert recording.notes == ()
     assert np.array_equal(recording.positions, positions)
@@ -97,7 +97,7 @@ def test_what_is_mended_is_counted():
     kept = np.delete(np.arange(100), [50, 51, 52, 80])
     kept = np.append(kept, [7, 8])  # Again, and out of order.
     positions[20, 2] = np.nan
-    recording = merged([(stamps[kept], JOINTS, positions[kept])], 'live')
+    recording = merge_chunks([(stamps[kept], JOINTS, positions[kept])], 'live')
     assert recording.notes == (
         '2 samples out of order, sorted by stamp',
         '2 duplicates of a stamp, the first is kept',
@@ -114,14 +114,14 @@ def test_jitter_is_counted():
     stamps, positions = ramp()
     stamps[10] += 400_000
     stamps[30] += 100_000  # 5 %, which is none.
-    recording = merged([(stamps, JOINTS, positions)], 'live')
+    recording = merge_chunks([(stamps, JOINTS, positions)], 'live')
     assert recording.notes == (
         '2 of 99 intervals jitter by more than 10% of the usual 0.002 s',)
 
 
 def test_joints_missing_in_part_of_the_messages_are_named():
     stamps, positions = ramp()
-    recording = merged([(stamps[:60], JOINTS, positions[:60]),
+    recording = merge_chunks([(stamps[:60], JOINTS, positions[:60]),
                         (stamps[60:], JOINTS[:3], positions[60:, :3])], 'live')
     assert recording.notes == ("joint 'rf_knee': 60 samples where others have 100",)
     assert np.isnan(recording.positions[60:, 3]).all()
@@ -131,7 +131,7 @@ def test_joints_missing_in_part_of_the_messages_are_named():
 def test_a_week_of_nanoseconds_rises_strictly():
     stamps = START + np.array([0, 1, 2, 10**9, 10**9 + 1, 7 * 86400 * 10**9, 10**16,
                                10**16 + 1])
-    recording = merged([(stamps, ('knee',), np.arange(8.0)[:, None])], 'live')
+    recording = merge_chunks([(stamps, ('knee',), np.arange(8.0)[:, None])], 'live')
     assert (np.diff(recording.times) > 0.0).all()
     assert recording.positions[:5, 0].tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
 
@@ -159,13 +159,13 @@ def test_a_week_of_nanoseconds_rises_strictly():
 ])
 def test_what_is_no_recording_is_refused_in_one_line(made, joints, message):
     with pytest.raises(RecordingError) as error:
-        merged(made, 'live', joints)
+        merge_chunks(made, 'live', joints)
     assert str(error.value) == message
 
 
 def test_select():
     stamps, positions = ramp()
-    recording = merged([(stamps, JOINTS, positions)], 'live')
+    recording = merge_chunks([(stamps, JOINTS, positions)], 'live')
     args = recording.select(('rf_knee', 'lf_hip'))
     assert args.joints == ('rf_knee', 'lf_hip')
     assert np.array_equal(args.positions, positions[:, [3, 0]])

@@ -17,11 +17,11 @@
 import tracemalloc
 
 from bags import joint_state, START, write_bag
-from cpg_ros.fitting.recordings import joint_streams, thinned
+from cpg_ros.fitting.recordings import downsampling, joint_streams
 from cpg_ros.fitting.recordings.bag_reader import read_bag
 from cpg_ros.fitting.recordings.csv_reader import read_csv
-from cpg_ros.fitting.recordings.recording import merged
-from cpg_ros.fitting.recordings.thinned import smoothed, Thinned
+from cpg_ros.fitting.recordings.downsampling import average_on_grid, Downsampler
+from cpg_ros.fitting.recordings.recording import merge_chunks
 import numpy as np
 import pytest
 from walks import table_of
@@ -32,7 +32,7 @@ STEP = 10_000_000
 @pytest.fixture
 def soon(monkeypatch):
     """Make what counts as long short."""
-    monkeypatch.setattr(thinned, 'MAX_RAW_SAMPLES', 2000)
+    monkeypatch.setattr(downsampling, 'MAX_RAW_SAMPLES', 2000)
     monkeypatch.setattr(joint_streams, 'MAX_RAW_SAMPLES', 2000)
 
 
@@ -47,13 +47,13 @@ def test_a_stride_passes_and_noise_is_averaged():
     rng = np.random.default_rng(0)
     stamps = START + np.cumsum(rng.integers(1_600_000, 2_400_000, 30000))
     clean = motion(1e-9 * (stamps - START))
-    at, found = smoothed(stamps, clean + 0.05 * rng.normal(size=clean.shape), STEP)
+    at, found = average_on_grid(stamps, clean + 0.05 * rng.normal(size=clean.shape), STEP)
     inner = slice(2, -2)
     assert (at[inner] % STEP == 0).all() and (np.diff(at) == STEP)[inner].all()
     left = (found - motion(1e-9 * (at - START)))[inner]
     # Of fifteen samples a parabola leaves two fifths of the noise, and no more of the motion.
     assert 0.3 < left.std() / 0.05 < 0.5 and np.abs(left.mean(axis=0)).max() < 2e-3
-    assert np.abs(smoothed(stamps, clean, STEP)[1] - motion(1e-9 * (at - START)))[
+    assert np.abs(average_on_grid(stamps, clean, STEP)[1] - motion(1e-9 * (at - START)))[
         inner].max() < 2e-3
 
 
@@ -62,7 +62,7 @@ def test_gaps_spikes_and_missing_values():
     stamps[2500:] += 777_000_000
     values = motion(1e-9 * (stamps - START))
     values[1000, 0], values[1200:1300, 1], values[3000, 1] = 50.0, np.nan, 1e300
-    at, found = smoothed(stamps, values, STEP)
+    at, found = average_on_grid(stamps, values, STEP)
     assert (np.diff(at) > 0).all()
     truth = motion(1e-9 * (at - START))
     missing = (at > stamps[1204]) & (at < stamps[1294])
@@ -71,15 +71,15 @@ def test_gaps_spikes_and_missing_values():
     assert np.nanmax(np.abs(found - truth)) < 0.02
 
 
-def test_a_fast_stride_is_not_thinned_away(monkeypatch):
-    monkeypatch.setattr(thinned, 'MAX_RAW_SAMPLES', 2000)
+def test_a_fast_stride_survives_downsampling(monkeypatch):
+    monkeypatch.setattr(downsampling, 'MAX_RAW_SAMPLES', 2000)
     t = np.arange(6000) / 500.0
     for frequency, step in ((2.0, 10_000_000), (4.5, 5_000_000), (12.0, 0)):
-        samples = Thinned()
+        samples = Downsampler()
         for k in range(0, 6000, 500):
             samples.add((1e9 * t[k:k + 500]).astype(np.int64), motion(t[k:k + 500], frequency))
         assert samples.step == step and bool(samples.note) == bool(step)
-        stamps, values = samples.taken()
+        stamps, values = samples.flush()
         assert len(stamps) == pytest.approx(12e9 / (step or 2_000_000), abs=2)
         assert np.abs(values - motion(1e-9 * stamps, frequency))[3:-3].max() < 5e-3
 
@@ -102,7 +102,7 @@ def test_a_long_recording_is_in_memory_once(soon):
                    np.tile(motion(part), 6))
 
     tracemalloc.start()
-    recording = merged(chunks(), 'long')
+    recording = merge_chunks(chunks(), 'long')
     most = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert len(recording.times) == pytest.approx(80_000, abs=2)

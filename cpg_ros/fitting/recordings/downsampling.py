@@ -51,20 +51,20 @@ def drop_outlier_stamps(parts: list[Part]) -> tuple[list[Part], list[str]]:
     usual = np.median(steps[steps > 0]) if (steps > 0).any() else 0.0
     gaps = np.flatnonzero(steps > max(GAP_RATIO * usual * stamps.size, MIN_GAP)) + 1
     ends = np.concatenate([[0], gaps, [stamps.size]])
-    most = int(np.argmax(np.diff(ends)))
-    lost = stamps.size - int(ends[most + 1] - ends[most])
-    if not lost:
+    longest = int(np.argmax(np.diff(ends)))
+    num_lost = stamps.size - int(ends[longest + 1] - ends[longest])
+    if not num_lost:
         return parts, []
-    first, last = stamps[ends[most]], stamps[ends[most + 1] - 1]
+    first, last = stamps[ends[longest]], stamps[ends[longest + 1] - 1]
     remaining = []
-    for own, columns, positions in parts:
-        there = (own >= first) & (own <= last)
-        if there.any():
-            remaining.append((own[there], columns, positions[there]))
-    stray = stamps[0] if ends[most] else stamps[-1]
-    return remaining, [f'{pluralize(lost, "sample")} stamped far from the others, left out, such '
-                       f'as at {stray / 1e9:.10g} s: the others are from {first / 1e9:.10g} s to '
-                       f'{last / 1e9:.10g} s']
+    for part_stamps, columns, positions in parts:
+        inside = (part_stamps >= first) & (part_stamps <= last)
+        if inside.any():
+            remaining.append((part_stamps[inside], columns, positions[inside]))
+    stray = stamps[0] if ends[longest] else stamps[-1]
+    return remaining, [f'{pluralize(num_lost, "sample")} stamped far from the others, left out, '
+                       f'such as at {stray / 1e9:.10g} s: the others are from '
+                       f'{first / 1e9:.10g} s to {last / 1e9:.10g} s']
 
 
 def drop_outlier_positions(parts: list[Part], width: int) -> np.ndarray:
@@ -73,23 +73,23 @@ def drop_outlier_positions(parts: list[Part], width: int) -> np.ndarray:
     for _, columns, positions in parts:
         # Column by column: a long recording is large.
         for k, column in zip(columns, positions.T, strict=True):
-            far = _far(column)
-            count[k] += np.count_nonzero(far)
-            column[far] = np.nan
+            outliers = _outliers(column)
+            count[k] += np.count_nonzero(outliers)
+            column[outliers] = np.nan
     return count
 
 
-def _far(column: np.ndarray) -> np.ndarray:
+def _outliers(column: np.ndarray) -> np.ndarray:
     """Return which positions of a joint are beyond all others, shape (samples,)."""
-    there = np.isfinite(column)
-    far = there & (np.abs(column) > MAX_POSITION)
-    near = there & ~far
-    if near.any():
-        low, middle, high = np.percentile(column[near], (5.0, 50.0, 95.0))
-        spikes = near & (np.abs(column - middle) > SPIKE_RATIO * max(high - low, 1.0))
-        if np.count_nonzero(spikes) <= max(1.0, MAX_SPIKE_FRACTION * np.count_nonzero(near)):
-            far |= spikes
-    return far
+    finite = np.isfinite(column)
+    outliers = finite & (np.abs(column) > MAX_POSITION)
+    plausible = finite & ~outliers
+    if plausible.any():
+        low, middle, high = np.percentile(column[plausible], (5.0, 50.0, 95.0))
+        spikes = plausible & (np.abs(column - middle) > SPIKE_RATIO * max(high - low, 1.0))
+        if np.count_nonzero(spikes) <= max(1.0, MAX_SPIKE_FRACTION * np.count_nonzero(plausible)):
+            outliers |= spikes
+    return outliers
 
 
 #: MAX_RAW_SAMPLES: messages or rows; with more, a recording is long.
@@ -108,7 +108,7 @@ CENTRE_TOLERANCE = 0.3
 SPIKE_STD_RATIO = 3.0
 
 
-class Thinned:
+class Downsampler:
     """Samples of some joints, as received, or on a grid once they are many.
 
     Attributes:
@@ -120,7 +120,7 @@ class Thinned:
 
     def __init__(self) -> None:
         self.step, self.count, self.rate = 0, 0, 0.0
-        self._coming: list[tuple[np.ndarray, np.ndarray]] = []
+        self._pending: list[tuple[np.ndarray, np.ndarray]] = []
         self._size, self._next = 0, MAX_RAW_SAMPLES
         # The grid so far, in arrays that grow in place: joining pieces would take twice the
         # memory.
@@ -134,12 +134,12 @@ class Thinned:
             values: shape (n, columns).
 
         """
-        self._coming.append((stamps, values))
+        self._pending.append((stamps, values))
         self.count += len(stamps)
         self._size += len(stamps)
         if self._size < self._next:
             return
-        stamps, values = self._joined()
+        stamps, values = self._concatenate()
         if not self.step:
             self.step, self.rate = _step_for(stamps, values)
             # Without a step now, there may be one later: joints may stand at first.
@@ -150,23 +150,23 @@ class Thinned:
             points = _points(stamps, self.step)
             last = int(np.flatnonzero(np.append(True, points != points[-1]))[-1])
             self._keep(stamps[:last], values[:last])
-        self._coming = [(stamps[last:].copy(), values[last:].copy())]
+        self._pending = [(stamps[last:].copy(), values[last:].copy())]
         self._size = len(stamps) - last
 
-    def _joined(self) -> tuple[np.ndarray, np.ndarray]:
-        stamps, values = zip(*self._coming, strict=True)
+    def _concatenate(self) -> tuple[np.ndarray, np.ndarray]:
+        stamps, values = zip(*self._pending, strict=True)
         return np.concatenate(stamps), np.concatenate(values)
 
     def _keep(self, stamps: np.ndarray, values: np.ndarray) -> None:
         """Put samples on the grid."""
-        stamps, values = smoothed(stamps, values, self.step)
+        stamps, values = average_on_grid(stamps, values, self.step)
         self._stamps.frombytes(stamps.tobytes())
         self._values.frombytes(values.tobytes())
 
-    def taken(self) -> tuple[np.ndarray, np.ndarray]:
+    def flush(self) -> tuple[np.ndarray, np.ndarray]:
         """Return stamps and values, and forget them."""
-        stamps, values = self._joined()
-        self._coming = []
+        stamps, values = self._concatenate()
+        self._pending = []
         if self.step:
             self._keep(stamps, values)
             stamps, columns = np.frombuffer(self._stamps, np.int64), values.shape[1]
@@ -195,7 +195,7 @@ def _step_for(stamps: np.ndarray, values: np.ndarray) -> tuple[int, float]:
     usual = float(np.median(intervals[intervals > 0]))
     power: np.ndarray | float = 0.0
     for low, high in pairwise(range(0, len(values) + 1, min(SPECTRUM_SIZE, len(values)))):
-        part = _without_odd(values[low:high])
+        part = _without_spikes(values[low:high])
         part = np.nan_to_num(part - np.nanmean(np.where(np.isfinite(part), part, 0.0), axis=0))
         power = power + np.sum(np.abs(np.fft.rfft(part, axis=0))**2, axis=1)
     frequencies = np.fft.rfftfreq(min(SPECTRUM_SIZE, len(values)), usual * 1e-9)
@@ -205,17 +205,30 @@ def _step_for(stamps: np.ndarray, values: np.ndarray) -> tuple[int, float]:
     return (steps[0] if steps else 0), 1e9 / usual
 
 
-def _without_odd(values: np.ndarray) -> np.ndarray:
+def drop_spikes(values: np.ndarray) -> int:
+    """Replace samples far off both neighbours by NaN; return their number.
+
+    Args:
+        values: changed in place, shape (n,) or (n, columns).
+
+    """
+    before, centre, after = values[:-2], values[1:-1], values[2:]
+    off = np.abs(centre - 0.5 * (before + after))
+    with np.errstate(invalid='ignore'):
+        spikes = off > SPIKE_STD_RATIO * np.maximum(np.nanstd(values, axis=0),
+                                                    np.abs(after - before))
+    centre[spikes] = np.nan
+    return int(np.count_nonzero(spikes))
+
+
+def _without_spikes(values: np.ndarray) -> np.ndarray:
     """Return values without single spikes and without values that are not angles."""
     values = np.where(np.abs(values) <= MAX_POSITION, values, np.nan)
-    before, here, after = values[:-2], values[1:-1], values[2:]
-    off = np.abs(here - 0.5 * (before + after))
-    wild = off > SPIKE_STD_RATIO * np.maximum(np.nanstd(values, axis=0), np.abs(after - before))
-    here[wild] = np.nan
+    drop_spikes(values)
     return values
 
 
-def smoothed(stamps: np.ndarray, values: np.ndarray, step: int
+def average_on_grid(stamps: np.ndarray, values: np.ndarray, step: int
              ) -> tuple[np.ndarray, np.ndarray]:
     """Put samples on the grid.
 
@@ -234,16 +247,16 @@ def smoothed(stamps: np.ndarray, values: np.ndarray, step: int
     if not len(stamps):
         return stamps, values
     order = np.argsort(stamps, kind='stable')
-    stamps, values = stamps[order], _without_odd(values[order])
+    stamps, values = stamps[order], _without_spikes(values[order])
     numbers = _points(stamps, step)
     points, first = np.unique(numbers, return_index=True)
-    there = np.isfinite(values)
-    count = np.add.reduceat(there, first, dtype=float)
-    own = ((stamps - numbers * step) / step)[:, None]
+    finite = np.isfinite(values)
+    count = np.add.reduceat(finite, first, dtype=float)
+    offset = ((stamps - numbers * step) / step)[:, None]
     with np.errstate(invalid='ignore'):
         # Points without samples become NaN by 0 / 0.
-        mean = np.add.reduceat(np.where(there, values, 0.0), first) / count
-        off = np.add.reduceat(there * own, first) / count
+        mean = np.add.reduceat(np.where(finite, values, 0.0), first) / count
+        off = np.add.reduceat(finite * offset, first) / count
     rise = np.diff(mean, axis=0) / (1.0 + np.diff(off, axis=0))
     beside = np.isfinite(rise) & (np.diff(points) == 1)[:, None]
     rise = np.where(beside, rise, 0.0)
