@@ -27,7 +27,7 @@ import warnings
 
 from common import emit, log
 from cpg_ros.dynamics.continuation import Branch, continue_orbit
-from cpg_ros.dynamics.fourier.orbit import equations
+from cpg_ros.dynamics.fourier.orbit import equations, resample
 from cpg_ros.dynamics.mesh.orbit import Reduced
 from cpg_ros.dynamics.solve_orbit import solve_preset
 from cpg_ros.networks.network import ParameterLine
@@ -50,18 +50,18 @@ TARGETS = {'ratio_median': 1.0}
 def by_root(branch: Branch) -> list[float]:
     """Periods by scipy.optimize.root, NaN from where it fails on."""
     orbit, periods = branch.points[0].orbit, []
-    z = np.append(orbit.values, orbit.period)
+    waves, period = orbit.values.reshape(-1, orbit.values.shape[-1]), orbit.period
     for point in branch.points[1:]:
-        # Nodes as ours has them.
-        if point.orbit.values.size != z.size - 1:
-            n = point.orbit.values.size
-            z = np.append(np.interp(np.arange(n) / n, np.arange(z.size - 1) / (z.size - 1),
-                                    z[:-1], period=1.0), z[-1])
+        rows, n = len(waves), point.orbit.values.shape[-1]  # nodes as ours has them
+        waves = np.array([resample(wave, n) for wave in waves])
         network, mode = point.orbit.network, point.orbit.symmetry
-        found = root(lambda z: equations(network, mode, z[:-1], z[-1])[:2], z,  # noqa: B023
-                     jac=True, tol=1e-12)
-        z = found.x
-        periods.append(float(z[-1]) if found.success else np.nan)
+
+        def residual(z, network=network, mode=mode, rows=rows):
+            return equations(network, mode, z[:-1].reshape(rows, -1), z[-1])[:2]
+
+        result = root(residual, np.append(waves, period), jac=True, tol=1e-12)
+        waves, period = result.x[:-1].reshape(rows, -1), result.x[-1]
+        periods.append(float(period) if result.success else np.nan)
     return periods
 
 
@@ -79,7 +79,7 @@ def by_bvp(branch: Branch) -> list[float]:
             return p[0] * reduced.rates(y.T).T
 
         def jacobian(s, y, p, reduced=reduced):
-            return (p[0] * reduced.jacobian(y.T).transpose(1, 2, 0),
+            return (p[0] * reduced.linearised(y.T)[1].transpose(1, 2, 0),
                     reduced.rates(y.T).T[:, None, :])
 
         def ends(left, right, p, reduced=reduced):

@@ -212,7 +212,7 @@ def picture(path: Path, known: list[dict]) -> None:
 
 def row(clip: Clip, one: StretchFit) -> dict[str, object]:
     """Return a stretch as a row of the result."""
-    errors = [] if one.fit is None else [round(100.0 * one.fit.fractions[order], 1)
+    errors = [] if one.fit is None else [round(100.0 * one.fit.fit.fractions[order], 1)
                                          for order in ORDERS]
     return {'body': clip.body, 'recording': clip.recording.source.rpartition('/')[2],
             'begin': round(one.begin, 1), 'end': round(one.end, 1),
