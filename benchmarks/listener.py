@@ -81,8 +81,9 @@ def main(seconds: float, path: str) -> None:
                 deadline = time.monotonic() + seconds
             while (taken := diagnostics.handle.take_message(DiagnosticArray, False)) is not None:
                 for status in taken[0].status:
-                    health[1:] = [{'message': status.message, **{
-                        value.key: value.value for value in status.values}}]
+                    if status.name.endswith(': pattern'):  # not a panel's
+                        health[1:] = [{'message': status.message, **{
+                            value.key: value.value for value in status.values}}]
     np.savez(path, arrival=np.array(arrival), source=np.array(source), stamp=np.array(stamp),
              sequence=np.array(sequence), health=json.dumps(health))
     rclpy.shutdown()
