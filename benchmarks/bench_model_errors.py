@@ -44,9 +44,9 @@ import numpy as np
 
 GO2 = ROOT / 'config' / 'unitree_go2.yaml'
 #: Of a usual floor; time of the steady walk, s, and its first part that is ignored, s.
-FRICTION, WALK, BEGINNING = 0.8, 8.0, 3.0
-#: Time of the pushes, s.
-PUSHED = 2.5
+FRICTION, WALK, BEGINNING = 0.8, 14.0, 8.0
+#: Time of the pushes, s: by then the feedback knows the servos' gains.
+PUSHED = 6.0
 
 
 class Row(NamedTuple):
@@ -158,11 +158,12 @@ def held(loop: ClosedLoopBatch, rate: float) -> None:
 
 def measure(row: Row, args: argparse.Namespace) -> dict[str, Any]:
     """Return the figures of a row."""
-    one = subject(GO2, args.gait, robot_gains(read_robot(GO2)), args.seed, args.quick)
+    gains = robot_gains(read_robot(GO2))._replace(servo_gains=not args.without)
+    one = subject(GO2, args.gait, gains, args.seed, args.quick)
     rng = np.random.default_rng(args.seed)
     row.change(one.loop, rng)
     held(one.loop, row.rate)
-    one.noise = SensorNoise(**row.noise, seed=args.seed)
+    one.noise = SensorNoise(**{'delay': 1e-3 * args.late, **row.noise}, seed=args.seed)
     usual = {'friction': FRICTION, 'speed': args.speed, **row.scenario}
     walk = one.run([Scenario(**usual, phase=k / 4) for k in range(2 if args.quick else 4)], WALK)
     late = slice(round(BEGINNING / one.loop.timestep), None)
@@ -220,6 +221,9 @@ def main() -> int:
                         help='of the pushes, N s (default: 30 40)')
     parser.add_argument('--rows', nargs='+', default=list(ROWS), choices=list(ROWS),
                         metavar='ROW', help='; '.join(ROWS))
+    parser.add_argument('--late', type=float, default=0.0, metavar='MS',
+                        help='delay of all sensors (default: %(default)g)')
+    parser.add_argument('--without', action='store_true', help='without the law servo_gains')
     parser.add_argument('--biped', choices=['unitree_g1', 'humanoid'],
                         help='a biped instead, with rows of its own')
     parser.add_argument('--quick', action='store_true', help='few runs: a look')
@@ -236,7 +240,7 @@ def main() -> int:
         log(f'{name}: {rows[name]} ({time.perf_counter() - began:.0f} s)')
     log(table(rows))
     emit(benchmark='model_errors', robot=args.biped or 'go2', gait=args.gait, speed=args.speed,
-         seed=args.seed, quick=args.quick, rows=rows)
+         seed=args.seed, quick=args.quick, late=args.late, without=args.without, rows=rows)
     return 0
 
 

@@ -45,7 +45,7 @@ from cpg_ros.feedback.input_checks import (
     NUM_VALUES,
 )
 from cpg_ros.feedback.kinematics import LegArrays
-from cpg_ros.feedback.laws import virtual_stiffness
+from cpg_ros.feedback.laws import servo_gains, virtual_stiffness
 from cpg_ros.feedback.leg_rates import compare_rates, rates_memory
 from cpg_ros.feedback.tick import PlannedMotion, tick
 import numpy as np
@@ -78,7 +78,7 @@ class Senses(NamedTuple):
         imu: as in the message, shape (IMU,).
         joints: positions, velocities and efforts, shape (JOINT_SIZE, joints).
         feet: loads, shape (1, legs), or forces, shape (legs, FORCE_SIZE).
-        counts: measured joints, and which of CONTACTS it is, shape (2,).
+        counts: measured joints, which of CONTACTS it is, and whether there are efforts, (3,).
         indices: indices 0, 1, 2 and so on.
         mount: orientation of the IMU in the base's frame, x y z w.
         limits: of the joints, lowest, highest, fastest, shape (3, joints).
@@ -116,8 +116,9 @@ class Senses(NamedTuple):
                    np.zeros(inputs, whole), never[:IMU].copy(),
                    never[:JOINT_SIZE * joints].reshape(JOINT_SIZE, joints).copy(),
                    np.full((legs, FORCE_SIZE) if kind == 1 else (1, legs), math.nan),
-                   np.array([joints, kind]), np.arange(joints), mount, limits, np.array([weight]),
-                   np.zeros(IMU_STATE_SIZE), np.zeros((legs, 1)), np.zeros(legs))
+                   np.array([joints, kind, 0]), np.arange(joints), mount, limits,
+                   np.array([weight]), np.zeros(IMU_STATE_SIZE), np.zeros((legs, 1)),
+                   np.zeros(legs))
 
 
 @jit
@@ -269,7 +270,9 @@ class LoopData(NamedTuple):
         corrected: angles, rad, shape (1, joints); filled.
         odometry: of the base, advanced in place.
         position: target angles within the limits, rad, shape (1, joints).
-        sent: angles to send, which virtual stiffness moves, rad, shape (1, joints); filled.
+        sent: angles to send, which virtual_stiffness and servo_gains move, rad, shape (1,
+            joints); filled.
+        servos: estimate of their gains, changed in place.
 
     """
 
@@ -287,6 +290,7 @@ class LoopData(NamedTuple):
     odometry: Odometry
     position: np.ndarray
     sent: np.ndarray
+    servos: servo_gains.ServoEstimate
 
     @classmethod
     def of(cls, feedback: Feedback, senses: Senses, sensors: SensorData, instant: Instant,
@@ -297,7 +301,8 @@ class LoopData(NamedTuple):
         legs = feedback.geometry.arrays
         return cls(legs, feedback.tables, feedback.gains, feedback.memory, senses, sensors,
                    planned, rates_memory(len(legs.rows)), instant, np.zeros(STATE_SIZE),
-                   goal[None], odometry, position[None], position[None].copy())
+                   goal[None], odometry, position[None], position[None].copy(),
+                   servo_gains.ServoEstimate.begin(1, goal.size))
 
 
 @jit
@@ -368,3 +373,11 @@ def finish(loop):
     if loop.gains.virtual_stiffness:
         virtual_stiffness.stretch(loop.sent, sensors.joint_positions, memory.stiff, loop.gains,
                                   loop.senses.limits)
+    if loop.gains.servo_gains and loop.gains.servo_kp > 0.0:
+        senses = loop.senses
+        fresh = senses.counts[2] and senses.monitors[1, LAST_VALID] == loop.instant.numbers[TIME]
+        servo_gains.restore(
+            loop.sent, (sensors.joint_positions, sensors.joint_velocities, senses.joints[2:]),
+            loop.servos, (memory.kp_scale, memory.stiff_for),
+            (loop.gains.servo_kp, loop.gains.servo_kd), senses.limits,
+            (dt, bool(fresh), loop.state[FRACTION]))

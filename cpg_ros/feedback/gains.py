@@ -38,8 +38,8 @@ import numpy as np
 
 #: All laws, in the order in which parameters and the reference list them.
 LAWS: Sequence[Law] = [import_module(f'cpg_ros.feedback.laws.{name}').LAW for name in (
-    'posture', 'placement', 'pace', 'stiffen', 'virtual_stiffness', 'reflexes', 'clearance',
-    'slope', 'heading', 'speed', 'sidestep')]
+    'posture', 'placement', 'pace', 'stiffen', 'virtual_stiffness', 'servo_gains', 'reflexes',
+    'clearance', 'slope', 'heading', 'speed', 'sidestep')]
 #: Gains that all laws share.
 COMMON = {'smooth': Gain(0.008, 0.08, 's',
                          'time constant with which every displacement is smoothed')}

@@ -26,6 +26,7 @@ from cpg_ros.feedback.estimate import BodyState, SensorData
 from cpg_ros.feedback.feedback import Feedback
 from cpg_ros.feedback.gains import Gains, VARIABLES
 from cpg_ros.feedback.kinematics import geometry_of
+from cpg_ros.feedback.laws.servo_gains import restore, ServoEstimate
 from cpg_ros.feedback.laws.virtual_stiffness import stretch
 from cpg_ros.feedback.tick import PlannedMotion
 from cpg_ros.motion.pattern import Pattern
@@ -242,7 +243,7 @@ class ClosedLoop:
         self.state_of = BodyState(batch.geometry, runs)
         self.patterns = Patterns(batch.plans, self.feedback, scenarios, self._dt,
                                  gains is not None)
-        self._limits = np.stack([robot.column('lower'), robot.column('upper')])
+        self._limits = np.stack([robot.column(key) for key in ('lower', 'upper', 'velocity')])
         self.indices = robot.order_indices
         self.order = np.argsort(self.indices)
         self.bodies = _Bodies(batch, scenarios, self.order)
@@ -250,6 +251,9 @@ class ClosedLoop:
         self._noisy = None if noise is None else NoisySenses(noise, runs, len(robot.legs),
                                                              self._dt)
         self._delay = 0.0 if noise is None else noise.delay
+        self.servos, self._model = ServoEstimate.begin(runs, len(robot.joints)), batch.body.model
+        self._servo_scales = np.array([(scenario.kp, scenario.kd) for scenario in scenarios]).T
+        self._efforts: list[np.ndarray] = []
 
     def command(self) -> tuple[SensorData, np.ndarray]:
         """Advance patterns and feedback by a tick.
@@ -272,7 +276,23 @@ class ClosedLoop:
         angles = patterns.move(angles)
         if gains is not None and gains.virtual_stiffness:
             stretch(angles, noticed.joint_positions, feedback.memory.stiff, gains, self._limits)
+        if gains is not None and gains.servo_gains and gains.servo_kp:
+            restore(angles, (noticed.joint_positions, noticed.joint_velocities,
+                             self._measured_efforts()), self.servos,
+                    (feedback.memory.kp_scale, feedback.memory.stiff_for),
+                    (gains.servo_kp, gains.servo_kd), self._limits, (dt, True, 1.0))
         return noticed, angles[:, self.indices]
+
+    def _measured_efforts(self) -> np.ndarray:
+        """Return the torques with which servos hold the last targets, as late as all senses."""
+        last, senses, (kp, kd) = self.servos, self.senses, self._servo_scales
+        _, efforts = torques(self._model, last.targets[:, last.newest[0]][:, self.indices],
+                             senses.joint_positions[:, self.indices],
+                             senses.joint_velocities[:, self.indices],
+                             last.scales[:, last.newest[0]].round(KP_DIGITS) * kp, kd)
+        self._efforts.append(efforts[:, self.order])
+        late = len(self._efforts) > round(self._delay / self._dt)
+        return self._efforts.pop(0) if late else self._efforts[0]
 
     def go(self, ticks: int) -> None:
         """Take some ticks without a push."""

@@ -48,7 +48,7 @@ def of_size(ratio):
 
 
 def test_a_go2_has_the_usual_gains():
-    assert robot_gains(GO2) == Gains()
+    assert robot_gains(GO2) == Gains(servo_kp=60.0, servo_kd=2.0)
     assert pytest.approx(0.213 + math.hypot(0.213, 0.002)) == LENGTH
     assert robot_gains(replace(GO2, geometry=None)) == Gains()
 

@@ -14,5 +14,5 @@
 
 """The feedback laws of legs with point feet, one file each."""
 
-__all__ = ['clearance', 'heading', 'law', 'pace', 'placement', 'posture', 'reflexes', 'sidestep',
-           'slope', 'speed', 'stiffen', 'virtual_stiffness']
+__all__ = ['clearance', 'heading', 'law', 'pace', 'placement', 'posture', 'reflexes',
+           'servo_gains', 'sidestep', 'slope', 'speed', 'stiffen', 'virtual_stiffness']

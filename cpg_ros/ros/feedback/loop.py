@@ -193,7 +193,8 @@ class FeedbackLoop(SensorLoop):
         # A tick under way may still read those before.
         self._memories = [*self._memories[-1:], self._by_address.memory_of(self._data)]
         self._correction.arguments = ctypes.addressof(self._memories[-1])
-        if self._finish is None and (self._finishes or gains.virtual_stiffness):
+        moves = gains.virtual_stiffness or (gains.servo_gains and gains.servo_kp > 0.0)
+        if self._finish is None and (self._finishes or moves):
             self._finish = self._by_address.finishing_function(self._data)
             self._correction.finish = self._finish.address
 
@@ -206,6 +207,7 @@ class FeedbackLoop(SensorLoop):
         self.inputs.restart()
         self._data.rates[0][:] = 0.0
         self.odometry.restart()
+        self._data.servos.restart()
         self._instant.scale[0], self._instant.trim[:] = 1.0, 0.0
 
     def learn(self, plan: GaitPlan) -> None:
@@ -246,6 +248,11 @@ class FeedbackLoop(SensorLoop):
     def target(self) -> np.ndarray:
         """The angles to send, rad, shape (joints,), overwritten at every tick."""
         return super().target if self._finish is None else self._data.sent[0]
+
+    @property
+    def servo_ratios(self) -> np.ndarray:
+        """Ratios of the servos' kp and kd to servo_kp and servo_kd, in use, shape (2,)."""
+        return self._data.servos.used[0, :2]
 
     @property
     def fraction_array(self) -> np.ndarray:

@@ -318,7 +318,7 @@ class SensorInput:
         begin = layout.position, layout.velocity, layout.effort or layout.position
         if wrong:
             return joints, layout.same, wrong
-        self.senses.counts[0] = joints.size
+        self.senses.counts[0], self.senses.counts[2] = joints.size, layout.effort is not None
         # What is not measured is not used: any number will do.
         joints = np.append(joints, np.zeros(len(self._names) - joints.size, dtype=int))
         return (np.concatenate([first + DOUBLE * joints for first in begin if first is not None]),

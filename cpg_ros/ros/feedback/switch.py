@@ -353,7 +353,10 @@ class FeedbackSwitch:
         loop = self.loop
         if loop is None:
             return {'feedback': 'off'}
+        law = self._biped is None and self._value('servo_gains') and self._value('servo_kp')
         return {'feedback': loop.state if loop.enabled else 'off',
+                **({'kp, kd of the servos / expected': '{:.2f}, {:.2f}'.format(*loop.servo_ratios)}
+                   if law else {}),
                 **{f'age of {name} [ms]': f'{1e3 * age:.1f}'
                    for name, age in loop.inputs.ages(now).items()},
                 **{f'delay of {name} [ms]': f'{1e3 * delay:.1f}'

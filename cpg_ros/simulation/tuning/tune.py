@@ -20,6 +20,7 @@ and upright, measures steering tables, and writes the robot file with its part `
 
 import argparse
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 import sys
@@ -171,11 +172,21 @@ def _refuse_out(args: argparse.Namespace) -> None:
         raise InputError(f'argument --out: {args.out} is a directory')
 
 
+def _with_servos(robot: Robot, args: argparse.Namespace) -> Robot:
+    """Return a robot whose feedback expects the servos' gains that are given."""
+    own = robot.feedback
+    if own is None or 'servo_kp' not in own.gains:
+        return robot
+    given = {f'servo_{key}': value for key, value in (('kp', args.kp), ('kd', args.kd))
+             if value is not None}
+    return replace(robot, feedback=replace(own, gains={**own.gains, **given}))
+
+
 def _tune(args: argparse.Namespace) -> int:
     if args.evaluations is None:
         args.evaluations = NUM_GAINS if args.feedback else NUM_DESIGNS
     _refuse_options(args)
-    robot, report = load_robot(args.robot), partial(note, 'tune')
+    robot, report = _with_servos(load_robot(args.robot), args), partial(note, 'tune')
     if args.feedback:
         return _tune_feedback(args, robot)
     if args.gaits is None:

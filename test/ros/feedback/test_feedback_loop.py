@@ -20,11 +20,12 @@ import math
 from c_ticks import CTicks
 from cpg_ros.feedback.closed_loop import check_inputs
 from cpg_ros.feedback.estimate import TOUCHDOWN_LOAD
-from cpg_ros.feedback.gains import Gains
+from cpg_ros.feedback.gains import Gains, robot_gains
 from cpg_ros.feedback.input_checks import FADE, MAX_SILENCE, RECOVERY_TIME
 from cpg_ros.feedback.kinematics import geometry_of
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.strides import StrideCommand
+from cpg_ros.ros.bridges.supervisor import MAX_JUMP
 from cpg_ros.ros.feedback import sensor_input
 from cpg_ros.ros.feedback.loop import FeedbackLoop
 from cpg_ros.ros.feedback.sensor_input import SensorInput
@@ -90,11 +91,12 @@ def spoilt(message, how):
 class Robot:
     """A body whose topics may lie."""
 
-    def __init__(self, monkeypatch, contacts='foot_contacts', lag=0, **dull):
+    def __init__(self, monkeypatch, contacts='foot_contacts', lag=0, servos=(None, None),
+                 efforts=True, **dull):
         monkeypatch.setattr(sensor_input, 'PolledSubscription', Wire)
         Wire.wires = {}
         made = gait_plan('trot')
-        self.body = Body('go2', GO2)
+        self.body, self.efforts = Body('go2', GO2, *servos), efforts
         self.unit = SimulatedSensors(self.body, DT, SensorNoise(**dull))
         self.pattern = Pattern(made, 0.4, strides=StrideCommand(4))
         geometry = geometry_of(GO2)
@@ -115,6 +117,8 @@ class Robot:
             setattr(part, axis, value)
         joints.position, joints.velocity, joints.effort = (
             one.tolist() for one in (body.position, body.velocity, body.torque))
+        if not self.efforts:
+            joints.effort = []
         feet.data = body.feet.tolist()
         for one in (imu, joints):
             one.header.stamp.sec, one.header.stamp.nanosec = divmod(stamp, 10**9)
@@ -270,6 +274,35 @@ def test_targets_go_too_far_after_a_push_where_measurements_are_young(monkeypatc
     assert robot.loop.inputs.joints.age == pytest.approx(lag * DT, abs=DT)
     assert not any(acted[:round(2.5 / DT)])
     assert 0.0 < sum(acted) * DT <= gains.stiffen_longest if lag == 0 else not any(acted)
+
+
+@pytest.mark.parametrize(('servos', 'lag'), [((30.0, 2.0), 0), ((60.0, 3.6), 2)])
+def test_servos_with_other_gains_are_found_by_their_efforts(monkeypatch, servos, lag):
+    """Targets go further, or ahead, within the joints' limits, and less than bridges refuse."""
+    robot, last = Robot(monkeypatch, lag=lag, servos=servos), None
+    robot.loop.set_gains(robot_gains(GO2))
+    for k in range(round(5.0 / DT)):
+        robot.tick()
+        sent = robot.loop.target.copy()
+        assert (sent >= GO2.column('lower')).all() and (sent <= GO2.column('upper')).all()
+        assert last is None or (abs(sent - last)
+                                <= DT * GO2.column('velocity') + MAX_JUMP).all()
+        assert k * DT > 1.0 or (sent == robot.pattern.position).all()
+        last = sent
+    assert not robot.body.fallen
+    np.testing.assert_allclose(robot.loop.servo_ratios, np.divide(servos, (60.0, 2.0)), rtol=0.1)
+    robot.loop.restart()
+    assert (robot.loop.servo_ratios == 1.0).all()
+
+
+@pytest.mark.parametrize('how', [{'efforts': False, 'servos': (30.0, 2.0)}, {}])
+def test_without_efforts_or_with_the_expected_servos_targets_stay(monkeypatch, how):
+    robot = Robot(monkeypatch, **how)
+    robot.loop.set_gains(robot_gains(GO2))
+    for _ in range(round(4.0 / DT)):
+        robot.tick()
+        assert (robot.loop.target == robot.pattern.position).all()
+    assert not robot.body.fallen
 
 
 def test_switched_off_from_the_start_nothing_changes_bit_for_bit(monkeypatch):
