@@ -134,7 +134,7 @@ def main() -> None:
     high = np.array([*(one.high for one in numbers), np.inf])
 
     def posed() -> CycleProblem:
-        return CycleProblem(joints, joints.stated, start, GAIT, numbers, 3, GaitReadout())
+        return CycleProblem(joints, joints.errors, start, GAIT, numbers, 3, GaitReadout())
 
     def begun(problem: CycleProblem) -> np.ndarray:
         values = np.array([*START.values(), 0.0])

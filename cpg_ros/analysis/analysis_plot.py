@@ -99,7 +99,7 @@ def _draw_branch(axes: Axes, branch: Branch, kinds: list[int], colour: str) -> N
 
 def _draw_branches(axes: Axes, analysis: Analysis, assessed: Sequence[AssessedBranch]) -> None:
     shown: set[str] = set()
-    met: dict[str, str] = {}
+    labels: dict[str, str] = {}
     for member in assessed:
         gait, branch, colour = member.gait, member.branch, _colour(analysis, member.gait)
         _draw_branch(axes, branch, member.kinds, colour)
@@ -109,11 +109,11 @@ def _draw_branches(axes: Axes, analysis: Analysis, assessed: Sequence[AssessedBr
             axes.plot(point.value, point.point.amplitude, marker=MARKERS[point.kind],
                       markersize=6, color=colour,
                       markerfacecolor=colour if point in soft else axes.get_facecolor())
-            met[point.kind + (' (soft)' if point in soft else '')] = MARKERS[point.kind]
+            labels[point.kind + (' (soft)' if point in soft else '')] = MARKERS[point.kind]
         for end, last in zip(branch.ends, (branch.points[0], branch.points[-1]), strict=True):
             if end.why == 'period':
                 axes.plot(last.value, last.amplitude, marker='x', color=colour)
-                met['period grows'] = 'x'
+                labels['period grows'] = 'x'
     for start in on_line(analysis):
         axes.plot(start.value, 0.0, marker='o', color=_colour(analysis, start.gait), markersize=5,
                   clip_on=False)
@@ -135,7 +135,7 @@ def _draw_branches(axes: Axes, analysis: Analysis, assessed: Sequence[AssessedBr
                 for marker, label in (('o', 'Hopf point'), ('s', 'fold'), ('D', 'this set'))]
     handles += [Line2D([], [], color=plain, marker=marker, linestyle='', label=label,
                        markerfacecolor=plain if label.endswith('(soft)') else
-                       axes.get_facecolor()) for label, marker in met.items()]
+                       axes.get_facecolor()) for label, marker in labels.items()]
     axes.legend(handles=handles, fontsize=7, ncols=5, frameon=False, title='Branches of gaits',
                 title_fontsize=10, alignment='left', loc='lower left', bbox_to_anchor=(0.0, 1.0),
                 borderaxespad=0.2, borderpad=0.0)

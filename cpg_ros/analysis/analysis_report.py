@@ -406,9 +406,9 @@ class EquilibriumReport(ShortRepr):
         for cell, level in enumerate(levels):
             key = next((other for other in places if abs(other - level) < 1e-6), float(level))
             places.setdefault(key, []).append(str(cell + 1))
-        alike = len(places) == 1
+        single = len(places) == 1
         return f'{network.states[0]} ' + ', '.join(
-            f'{level:.4f}' + ('' if alike else f' in {" ".join(cells)}')
+            f'{level:.4f}' + ('' if single else f' in {" ".join(cells)}')
             for level, cells in places.items())
 
     def text(self) -> str:

@@ -157,12 +157,12 @@ def _is(cycle: LimitCycle, orbit: Orbit) -> bool:
     """Return whether a cycle is an orbit, or its image under a symmetry, from some phase on."""
     points = len(cycle.signals)
     exact = orbit.cycle(points)
-    seen = np.fft.rfft(cycle.signals - cycle.signals.mean(axis=0), axis=0)
+    spectrum = np.fft.rfft(cycle.signals - cycle.signals.mean(axis=0), axis=0)
     cells, blocks = orbit.network.cells, np.arange(orbit.network.variables)[:, None]
     for element in orbit.symmetry.group.elements.values():
         image = exact[:, (np.array(element) + blocks * cells).ravel()]
         waves = np.fft.rfft(image - image.mean(axis=0), axis=0).conj()
-        late = int(np.fft.irfft((seen * waves).sum(axis=1), points).argmax())
+        late = int(np.fft.irfft((spectrum * waves).sum(axis=1), points).argmax())
         gap = np.abs(cycle.signals - np.roll(image, late, axis=0)).max(axis=0)
         if (gap < SIGNAL_TOLERANCE * np.ptp(exact, axis=0).max()).all():
             return True

@@ -274,15 +274,15 @@ def evolve(epoch: Epoch, progress: Callable[[int], None] = lambda generation: No
         options['sampling'] = epoch.start
     algorithm = NSGA2(pop_size=epoch.population, **options)
     algorithm.setup(problem, termination=('n_gen', epoch.generations), seed=epoch.random)
-    tried: dict[Network, Score] = {score.network: score for score in epoch.assessed}
+    score_of: dict[Network, Score] = {score.network: score for score in epoch.assessed}
     for generation in range(epoch.generations):
         population = algorithm.ask()
         networks = [setup.build(values) for values in population.get('X')]
-        new = list(dict.fromkeys(network for network in networks if network not in tried))
+        new = list(dict.fromkeys(network for network in networks if network not in score_of))
         if new:
             scores = evaluate(new, space.gait, epoch.seed, 0 if paper else MAX_EXACT)
-            tried.update(zip(new, scores, strict=True))
-        scores = [tried[network] for network in networks]
+            score_of.update(zip(new, scores, strict=True))
+        scores = [score_of[network] for network in networks]
         # Sets whose waveforms miss their requirements come after all others.
         static = StaticProblem(problem, F=np.array(
             [score.objectives[:problem.n_obj] for score in scores]), **(
@@ -291,10 +291,10 @@ def evolve(epoch: Epoch, progress: Callable[[int], None] = lambda generation: No
         algorithm.tell(infills=population)
         progress(generation + 1)
     values = algorithm.pop.get('X')
-    last = [tried[setup.build(row)] for row in values]
+    last = [score_of[setup.build(row)] for row in values]
     best = sorted(range(len(last)), key=lambda k: (
         last[k].shortfall, float(last[k].errors.max()), last[k].stability, tuple(values[k])))
-    return EpochResult(values[best], tuple(last[k] for k in best), tuple(tried.values()))
+    return EpochResult(values[best], tuple(last[k] for k in best), tuple(score_of.values()))
 
 
 def _random(seed: int, island: int, epoch: int) -> int:
@@ -317,7 +317,7 @@ def archipelago(setup: SearchSetup, population: int, generations: int, seed: int
         progress: takes the number of finished generations.
 
     """
-    tried: dict[Network, Score] = {}
+    score_of: dict[Network, Score] = {}
     starts: list[np.ndarray | None] = [None] * islands
     scores: list[tuple[Score, ...]] = [()] * islands
     for epoch, begun in enumerate(range(0, generations, EPOCH_GENERATIONS)):
@@ -328,11 +328,11 @@ def archipelago(setup: SearchSetup, population: int, generations: int, seed: int
         results = list(map(evolve, epochs) if executor is None else executor.map(evolve, epochs))
         for result in results:
             for score in result.tried:
-                if score.network not in tried or score.exact > tried[score.network].exact:
-                    tried[score.network] = score
+                if score.network not in score_of or score.exact > score_of[score.network].exact:
+                    score_of[score.network] = score
         starts, scores = migrate(results)
         progress(begun + count)
-    return tuple(tried.values())
+    return tuple(score_of.values())
 
 
 def migrate(results: Sequence[EpochResult]
@@ -416,9 +416,9 @@ def optimise(network_name: str, gait: str, *, population: int = 60, generations:
     space = search_space(network_name, gait, bounds, fixed)
     if paper:
         preset = space.network.presets()[gait].network.as_dict()
-        given = {*bounds, *fixed}
+        names = {*bounds, *fixed}
         fixed |= {variable.name: preset[variable.members[0]] for variable in space.free
-                  if not given & {variable.name, *variable.members}
+                  if not names & {variable.name, *variable.members}
                   and variable.members[0] not in space.network.couplings}
         space = search_space(network_name, gait, bounds, fixed)
     if population < 4 or generations < 1:
@@ -432,23 +432,23 @@ def optimise(network_name: str, gait: str, *, population: int = 60, generations:
     with progress_bar(f'optimising the {gait}', generations, enabled=progress) as bar:
         if islands == 1:
             epoch = Epoch(setup, population, generations, seed, seed)
-            tried = (evolve(epoch, bar) if executor is None
-                     else executor.submit(evolve, epoch).result()).tried
+            scores = (evolve(epoch, bar) if executor is None
+                      else executor.submit(evolve, epoch).result()).tried
         else:
-            tried = archipelago(setup, population, generations, seed, islands, executor, bar)
+            scores = archipelago(setup, population, generations, seed, islands, executor, bar)
     if not paper:
-        return _front(space, tried, seed)
-    by_phase = non_dominated(list(tried), len(pairs(space.symmetry)))
+        return _front(space, scores, seed)
+    by_phase = non_dominated(list(scores), len(pairs(space.symmetry)))
     judged = tuple(evaluate([score.network for score in by_phase], gait, seed, MAX_VERIFIED))
-    return replace(_front(space, judged, seed), tried=tried, by_phase=tuple(by_phase))
+    return replace(_front(space, judged, seed), tried=scores, by_phase=tuple(by_phase))
 
 
-def _front(space: Space, tried: tuple[Score, ...], seed: int) -> Front:
+def _front(space: Space, scores: tuple[Score, ...], seed: int) -> Front:
     """Select a set from the front; remove those that fail the verification."""
-    left = [score for score in tried if score.exact and score.errors.max() <= MAX_FRONT_ERROR]
+    left = [score for score in scores if score.exact and score.errors.max() <= MAX_FRONT_ERROR]
     if not left:
-        best = min(tried, key=lambda score: (score.errors.max(), score.shortfall, score.stability))
-        raise _nothing(space, tried, _closeness(best))
+        best = min(scores, key=lambda one: (one.errors.max(), one.shortfall, one.stability))
+        raise _nothing(space, scores, _closeness(best))
     for _ in range(MAX_VERIFIED):
         front = sorted(non_dominated(left), key=_order)
         try:
@@ -459,8 +459,8 @@ def _front(space: Space, tried: tuple[Score, ...], seed: int) -> Front:
             if not left:
                 break
             continue
-        return Front(space, tuple(front), tried, verified)
-    raise _nothing(space, tried, why)
+        return Front(space, tuple(front), scores, verified)
+    raise _nothing(space, scores, why)
 
 
 def _closeness(best: Score) -> str:
@@ -473,8 +473,8 @@ def _closeness(best: Score) -> str:
     return 'the best has the phases, but is not on an orbit of this gait'
 
 
-def _nothing(space: Space, tried: tuple[Score, ...], why: str) -> NoGaitFound:
-    return NoGaitFound(f'no {space.gait} among {len(tried)} sets of weights: {why}; more '
+def _nothing(space: Space, scores: tuple[Score, ...], why: str) -> NoGaitFound:
+    return NoGaitFound(f'no {space.gait} among {len(scores)} sets of weights: {why}; more '
                        'generations, a larger population or another seed may find one')
 
 

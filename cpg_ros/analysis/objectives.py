@@ -140,7 +140,7 @@ def search_space(network_name: str, gait: str, bounds: Mapping[str, tuple[float,
     variables = _variables(network, gait)
     indices = {name: k for k, variable in enumerate(variables)
                for name in (*variable.members, variable.name)}
-    given: dict[int, str] = {}
+    sources: dict[int, str] = {}
     for name, (low, high) in [*bounds.items(), *((name, (value, value))
                                                  for name, value in fixed.items())]:
         if name not in indices:
@@ -148,8 +148,8 @@ def search_space(network_name: str, gait: str, bounds: Mapping[str, tuple[float,
                              f'{", ".join(variable.name for variable in variables)}')
         index = indices[name]
         old = variables[index]
-        if index in given:
-            raise InputError(f'{name} is the same as {given[index]}, which is given already')
+        if index in sources:
+            raise InputError(f'{name} is the same as {sources[index]}, which is given already')
         if name in bounds and not low < high:
             raise InputError(f'{name}: the lower bound {low:g} is not below the upper bound '
                              f'{high:g}')
@@ -157,7 +157,7 @@ def search_space(network_name: str, gait: str, bounds: Mapping[str, tuple[float,
         if not allowed.low <= low <= high <= allowed.high:
             raise InputError(f'{name}: {low:g}{"" if low == high else f" to {high:g}"} is not '
                              f'within {allowed.low:g} to {allowed.high:g}')
-        given[index] = name
+        sources[index] = name
         variables[index] = Variable(old.name, low, high, old.members)
     space = Space(network, gait, tuple(variables))
     if not space.free:

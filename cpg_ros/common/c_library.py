@@ -65,11 +65,11 @@ def _compile(sources: Mapping[str, str], library: Path, what: str, options: Sequ
         for file, text in sources.items():
             (Path(folder) / file).write_text(text)
         files = [file for file in sources if file.endswith('.c')]
-        done = subprocess.run([*command, *OPTIONS, *options, *files, '-lm', '-o', 'library.so'],
-                              cwd=folder, capture_output=True, text=True)
-        if done.returncode:
-            line = next((line for line in done.stderr.splitlines() if 'error' in line),
-                        f'it ended with {done.returncode}')
+        result = subprocess.run([*command, *OPTIONS, *options, *files, '-lm', '-o', 'library.so'],
+                                cwd=folder, capture_output=True, text=True)
+        if result.returncode:
+            line = next((line for line in result.stderr.splitlines() if 'error' in line),
+                        f'it ended with {result.returncode}')
             raise NoCompiler(f"the C compiler '{' '.join(command)}' cannot make {what}: {line}")
         os.replace(Path(folder) / 'library.so', library)
 

@@ -235,8 +235,8 @@ def _remove_unused(folder: Path) -> None:
         with contextlib.suppress(OSError), path.open('rb') as lock:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             # At once, or a process that starts now would find half of it.
-            removed = path.parent.rename(folder / f'.{path.parent.name}.{os.getpid()}')
-            shutil.rmtree(removed)
+            trash = path.parent.rename(folder / f'.{path.parent.name}.{os.getpid()}')
+            shutil.rmtree(trash)
 
 
 def _last_used(lock: Path) -> float:

@@ -156,28 +156,28 @@ def progress_bar(what: str, total: int, enabled: bool = True) -> Iterator[Callab
     """
     started = time.monotonic()
     live = sys.stderr.isatty()
-    shown = -1
+    last = -1
 
-    def update(done: int) -> None:
-        nonlocal shown
-        spent = time.monotonic() - started
-        if not enabled or spent < PROGRESS_DELAY or (done >= total and shown < 0):
+    def update(count: int) -> None:
+        nonlocal last
+        elapsed = time.monotonic() - started
+        if not enabled or elapsed < PROGRESS_DELAY or (count >= total and last < 0):
             return
-        fraction = done / total
+        fraction = count / total
         mark = int(fraction * (100 if live else 10))
-        if mark == shown:
+        if mark == last:
             return
-        shown = mark
+        last = mark
         bar = '#' * int(fraction * BAR_WIDTH)
         line = f'{what} [{bar:<{BAR_WIDTH}}] {fraction:4.0%}' + (
-            f', {spent / fraction - spent:.0f} s left' if fraction else '')
+            f', {elapsed / fraction - elapsed:.0f} s left' if fraction else '')
         sys.stderr.write(f'\r{line}\x1b[K' if live else line + '\n')
         sys.stderr.flush()
 
     try:
         yield update
     finally:
-        if live and shown >= 0:
+        if live and last >= 0:
             sys.stderr.write('\n')
 
 
@@ -221,8 +221,8 @@ def run(parser: Parser, work: Callable[[argparse.Namespace], int],
         note(parser.prog, str(error))
         return error.exit_code
     except OSError as error:
-        named = error.filename is not None and error.strerror is not None
-        note(parser.prog, f'{error.filename}: {error.strerror}' if named else str(error))
+        has_path = error.filename is not None and error.strerror is not None
+        note(parser.prog, f'{error.filename}: {error.strerror}' if has_path else str(error))
         return CpgError.exit_code
     except KeyboardInterrupt as interrupt:
         if message := str(interrupt) or stopped:

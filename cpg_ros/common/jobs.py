@@ -78,15 +78,15 @@ class JobProgress:
     @property
     def line(self) -> str:
         """The progress, as one line."""
-        spent = self._clock() - self._began
-        worked = self.done - self.kept
-        rate = worked / spent if spent > 0.0 else 0.0
+        elapsed = self._clock() - self._began
+        computed = self.done - self.kept
+        rate = computed / elapsed if elapsed > 0.0 else 0.0
         parts = [f'{self.what}: {self.done}' + ('' if self.total is None else f' of {self.total}')
                  + ' done', f'{self.failed} failed']
         if self.kept:
             parts.append(f'{self.kept} from before')
         parts.append(f'{rate:.2f} a second' if rate >= 1.0 else f'{60.0 * rate:.2g} a minute')
-        if self.total is not None and worked and self.done < self.total:
+        if self.total is not None and computed and self.done < self.total:
             parts.append(f'{_time((self.total - self.done) / rate)} left')
         return ', '.join(parts)
 
@@ -255,20 +255,20 @@ class _Stream(Generic[Job]):
         """Yield the outcomes of jobs that have ended; wait TICK_PERIOD at most."""
         done, _ = wait(self.flying, TICK_PERIOD, FIRST_COMPLETED)
         broken: BaseException | None = None
-        back: list[Job] = []
+        retries: list[Job] = []
         for future in done:
             job = self.flying.pop(future)
             error = CancelledError() if future.cancelled() else future.exception()
             if error is not None and self.fleet.lost(error):
                 broken = error
-                back.append(job)
+                retries.append(job)
                 continue
             self.alone = None
             yield JobOutcome(job, None if error else future.result(), error)
         if broken is None:
             return
         # All other jobs in the executor are lost, too.
-        back += self.flying.values()
+        retries += self.flying.values()
         self.flying.clear()
         died = isinstance(broken, BrokenProcessPool)
         if self.alone is not None:
@@ -279,9 +279,9 @@ class _Stream(Generic[Job]):
             else:
                 self.suspects.appendleft((job, deaths + died))
         elif died:
-            self.suspects.extend((job, 0) for job in back)
+            self.suspects.extend((job, 0) for job in retries)
         else:
-            self.jobs = itertools.chain(back, self.jobs)
+            self.jobs = itertools.chain(retries, self.jobs)
         self.fleet.renew()
 
 

@@ -553,11 +553,11 @@ def _located(ends: Sequence[BranchPoint], spectra: Sequence[list[np.ndarray]], p
         NoOrbit: a point between them cannot be resolved.
 
     """
-    known = dict(zip((0.0, 1.0), zip(ends, spectra, strict=True), strict=True))
+    spectrum_at = dict(zip((0.0, 1.0), zip(ends, spectra, strict=True), strict=True))
 
     def point_at(fraction: float) -> tuple[BranchPoint, list[np.ndarray]]:
-        if fraction in known:
-            return known[fraction]
+        if fraction in spectrum_at:
+            return spectrum_at[fraction]
         located = _between(ends[0].curve_point, ends[1].curve_point, fraction)
         if located is None:
             raise NoOrbit('no orbit between two points of a branch')

@@ -362,8 +362,8 @@ def _equal(one: np.ndarray, other: np.ndarray, same: float = STATE_TOLERANCE) ->
 
 def at_state(network: Network, state: np.ndarray) -> Equilibrium:
     """Return the equilibrium at a state of all cells, with the symmetries that fix it."""
-    kept = [name for name, image in _images(network, state) if name and _equal(image, state)]
-    return Equilibrium(network, state, group_of(network).subgroup(tuple(kept)))
+    symmetries = [name for name, image in _images(network, state) if name and _equal(image, state)]
+    return Equilibrium(network, state, group_of(network).subgroup(tuple(symmetries)))
 
 
 def all_equilibria(network: Network) -> list[Equilibrium]:
@@ -381,22 +381,22 @@ def all_equilibria(network: Network) -> list[Equilibrium]:
     """
     if not network.rests:
         return []
-    group, found = group_of(network), list[Equilibrium]()
-    alike = everywhere(network, equilibria(network))
-    middle = alike[0] if len(alike) else np.zeros(network.components)
+    group, results = group_of(network), list[Equilibrium]()
+    synchronous = everywhere(network, equilibria(network))
+    middle = synchronous[0] if len(synchronous) else np.zeros(network.components)
     for names in reversed(subgroups(group)):
         cell = Quotient(network, group.subgroup(names).orbits)
         starts = _scattered(cell.kept.size, NUM_SUBSPACE_STARTS)
         starts = np.concatenate([starts, middle[cell.kept] + starts
                                  * (1.0 + np.abs(middle[cell.kept])) / 3.0])
-        reached = [*alike] if names == tuple(group.elements) else [
+        reached = [*synchronous] if names == tuple(group.elements) else [
             *cell.newton_from_all(starts)[:, cell.columns]]
         for state in reached:
             if np.isfinite(state).all() and not any(
-                    _equal(other.state, image) for other in found
+                    _equal(other.state, image) for other in results
                     for _, image in _images(network, state)):
-                found.append(at_state(network, state))
-    return found
+                results.append(at_state(network, state))
+    return results
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -513,10 +513,10 @@ def continue_equilibrium(start: Equilibrium, line: ParameterLine | str, low: flo
 
     """
     line = ParameterLine.of(line, type(start.network))
-    kept = {*start.group.names}.intersection(
+    symmetries = {*start.group.names}.intersection(
         *(group_of(line.at(start.network, value)).names for value in (low, high)))
     group = start.group.subgroup(tuple(name for name, element in start.group.elements.items()
-                                       if element in kept))
+                                       if element in symmetries))
     size = float(np.abs(start.state).max()) or 1.0
     curve = EquilibriumCurve(start.network, group, line, high - low, size)
     cell = Quotient(start.network, group.orbits)
@@ -533,12 +533,12 @@ def continue_equilibrium(start: Equilibrium, line: ParameterLine | str, low: flo
             return ''
 
         folds, _ = continue_curve(begin, low, high, visit, longest_step=MAX_STEP, most=MAX_POINTS)
-        met: list[Crossing] = []
+        crossings: list[Crossing] = []
         ends = [(point, point.curve.orbit(point.z)) for point in points]
         for k, (last, now) in enumerate(pairwise(ends)):
-            met += _crossings(last, now)
-            met += [_fold(now[0], begin)] if k in folds else []
-        halves.append(([(point.value, one) for point, one in ends], met))
+            crossings += _crossings(last, now)
+            crossings += [_fold(now[0], begin)] if k in folds else []
+        halves.append(([(point.value, one) for point, one in ends], crossings))
     (back, before), (ahead, after) = halves
     return EquilibriumBranch(
         line, tuple(back[:0:-1] + ahead), tuple(before[::-1] + after))
@@ -546,7 +546,7 @@ def continue_equilibrium(start: Equilibrium, line: ParameterLine | str, low: flo
 
 def _crossings(*ends: tuple[CurvePoint, Equilibrium]) -> list[Crossing]:
     """Return the crossings between two neighbouring points of a branch, without folds."""
-    found: list[Crossing] = []
+    crossings: list[Crossing] = []
     (last, _), (point, _) = ends
     reach = last.curve.product(last.tangent, point.z - last.z)
     for which, pair in enumerate(zip(*(one.blocks for _, one in ends), strict=True)):
@@ -559,8 +559,8 @@ def _crossings(*ends: tuple[CurvePoint, Equilibrium]) -> list[Crossing]:
             except (NoOrbit, ValueError):
                 # Beside a fold rounding decides on the sign.
                 continue
-            found += _crossing(there, which, rank)
-    return found
+            crossings += _crossing(there, which, rank)
+    return crossings
 
 
 def _crossing(point: CurvePoint, which: int, rank: int) -> Iterator[Crossing]:

@@ -156,13 +156,13 @@ class Representation(ShortRepr):
         Return None if there are none, or more than one of the copies has it.
         """
         group = self.symmetry.group
-        known = renamed(symmetry, group)
-        if known is None or self.copies(known) != 1:
+        target = renamed(symmetry, group)
+        if target is None or self.copies(target) != 1:
             return None
-        if known == self.symmetry:
+        if target == self.symmetry:
             return self
-        other = replace(self, symmetry=known)
-        for name in group.elements.keys() - set(known.h):
+        other = replace(self, symmetry=target)
+        for name in group.elements.keys() - set(target.h):
             image = _moved(group, [name], [1.0], other.columns)
             if abs(np.vdot(other.columns, image)) > (
                     1.0 - ROUNDING_TOLERANCE) * other.columns.shape[1]:
@@ -203,7 +203,7 @@ def representations(group: Group, variables: int, odd: bool) -> tuple[Representa
             group has 24 elements.
 
     """
-    found: list[Representation] = []
+    result: list[Representation] = []
     candidates = chain.from_iterable(
         homomorphisms(group, names, variables, odd) for names in chain(
             [tuple(name for name, _ in group.generators)],
@@ -211,10 +211,10 @@ def representations(group: Group, variables: int, odd: bool) -> tuple[Representa
     for symmetry in candidates:
         values = _induced(symmetry)
         if (abs((np.abs(values)**2).mean() - 1.0) < ROUNDING_TOLERANCE
-                and not any(np.allclose(values, one.values) for one in found)):
-            found.append(Representation(symmetry, values))
-        if sum(one.dimension**2 for one in found) == len(group.elements):
-            return tuple(one for one in found if one.columns.size)
+                and not any(np.allclose(values, one.values) for one in result)):
+            result.append(Representation(symmetry, values))
+        if sum(one.dimension**2 for one in result) == len(group.elements):
+            return tuple(one for one in result if one.columns.size)
     raise InputError('the group is not monomial: its classes are not known')
 
 
@@ -370,10 +370,10 @@ class Block(ShortRepr):
 
         With the symmetry x -> -x, elements with a shift of 1/2 belong to K, too.
         """
-        kept = (Fraction(0), Fraction(1, 2)) if self.symmetry.odd else (Fraction(0),)
+        phases = (Fraction(0), Fraction(1, 2)) if self.symmetry.odd else (Fraction(0),)
         return self.representation.copies(Symmetry.of(
             other.symmetry.group, {name: shift for name, shift in other.symmetry.shifts
-                                   if shift in kept}, odd=self.symmetry.odd))
+                                   if shift in phases}, odd=self.symmetry.odd))
 
 
 def power(symmetry: Symmetry, n: int) -> Symmetry:
@@ -404,11 +404,11 @@ def classes(network: Network, group: Group | None = None) -> tuple[Representatio
 
 @cache
 def _class_of(group: Group, symmetry: Symmetry) -> Representation:
-    found = [one for each in representations(group, symmetry.variables, symmetry.odd)
-             if (one := each.towards(symmetry)) is not None]
-    if not found:
+    matches = [one for each in representations(group, symmetry.variables, symmetry.odd)
+               if (one := each.towards(symmetry)) is not None]
+    if not matches:
         raise InputError(f'{symmetry!r} belongs to no class of the equilibrium')
-    return found[0]
+    return matches[0]
 
 
 def block_of(expansion: Expansion, representation: Representation | Symmetry) -> Block:

@@ -234,21 +234,21 @@ def _cubic(linear: Linearised, multiplier: complex, part: int, pair: bool) -> co
     factor = complex(factor / abs(factor)) if pair else complex(round(factor.real))
     if not pair and abs(factor) != 1.0:
         raise NoOrbit('two disturbances that symmetry makes alike are critical')
-    alike = factor == 1.0
+    same = factor == 1.0
     along, guesses = equation.slope, [equation.along()]
-    if alike:
+    if same:
         guesses.append(guess)
     critical = linear.find(1.0, np.array(guesses))
-    right = critical[1] if alike else linear.find(factor, guess[None])[0]
+    right = critical[1] if same else linear.find(factor, guess[None])[0]
     v = equation.values(right, np.zeros_like(along[0]), factor)
     size = np.abs(v[0]).max()
     v = v[0] / size, None if v[1] is None else v[1] / size
 
     # Sources have a component along the orbit and one along v; if both factors are 1, the left
     # null vectors separate them together.
-    weights = np.array([linear.fractions(1.0, linear.moved(y)) for y in ((along, v) if alike
+    weights = np.array([linear.fractions(1.0, linear.moved(y)) for y in ((along, v) if same
                                                                       else (along,))]).T
-    scale = None if alike else linear.fractions(factor, linear.moved(v))[0]
+    scale = None if same else linear.fractions(factor, linear.moved(v))[0]
 
     def fraction(rates: np.ndarray) -> complex:
         """Return the component along v."""
@@ -258,7 +258,7 @@ def _cubic(linear: Linearised, multiplier: complex, part: int, pair: bool) -> co
 
     other = _conj(v) if pair else v
     first = linear.form(v, other)
-    if alike and abs(fraction(first)) > ZERO_TOLERANCE * np.abs(first).max():
+    if same and abs(fraction(first)) > ZERO_TOLERANCE * np.abs(first).max():
         raise NoOrbit('a branch crosses this one (transcritical)')
     a = complex(np.linalg.solve(weights, linear.fractions(1.0, first))[0])
     mixed = linear.solve(first - a * linear.moved(along), 1.0)

@@ -187,9 +187,9 @@ class Pattern:
         self._ramp, self._approach = self._struct.ramp, self._struct.approach
         self._offset = robot.column('offset')
         self._limits = np.stack([robot.column(name) for name in ('lower', 'upper', 'velocity')])
-        #: The plan whose gait the network is to find by itself, if requested; _asked is then 1.
+        #: The plan whose gait the network is to find by itself, if requested; _request is then 1.
         self._drift: deque[GaitPlan] = deque(maxlen=1)
-        self._asked = ctypes.c_int32()
+        self._request = ctypes.c_int32()
         #: Runners by the addresses of their structs.
         self._runners: dict[int, GaitRunner] = {}
         self.position, self.velocity = self._offset.copy(), np.zeros_like(self._offset)
@@ -314,7 +314,7 @@ class Pattern:
         else:
             self._struct.waiting = None
             self._drift.append(plan)
-            self._asked.value = 1
+            self._request.value = 1
 
     def enable(self, enabled: bool, ramp: float) -> None:
         """Ramp into the gait, or down to the stand, over a time in s."""
@@ -392,12 +392,12 @@ class Pattern:
         They are the core's functions of a pattern and a time in s: advance (plan, then move),
         resume after a stall, plan (compute the wanted angles, which may then be corrected), move
         (move the joints to them within limits); report, which fills Instant.numbers and gaits;
-        what, the pattern; asked, a 32-bit integer that is not 0 if start_drift is to be called;
+        what, the pattern; attend, a 32-bit integer that is not 0 if start_drift is to be called;
         and the pointers to the arrays position, velocity, legs (phases) and state.
         """
         functions = {name: ctypes.cast(getattr(self._core, f'cpg_{name}'), ctypes.c_void_p).value
                      for name in ('advance', 'resume', 'plan', 'move', 'report')}
-        return {**functions, 'what': self._address, 'asked': ctypes.addressof(self._asked),
+        return {**functions, 'what': self._address, 'attend': ctypes.addressof(self._request),
                 **{name: self._address + getattr(Core, name).offset
                    for name in ('position', 'velocity', 'legs', 'state')}}
 
@@ -427,8 +427,8 @@ class Pattern:
 
     def start_drift(self) -> None:
         """Change to a plan without a transition, if one has been asked for."""
-        if self._asked.value:
-            self._asked.value = 0
+        if self._request.value:
+            self._request.value = 0
             while self._drift:
                 self._run(self._tracks[-1:])
                 self._newest.drift_to(self._drift.pop())

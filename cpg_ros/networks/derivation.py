@@ -67,8 +67,8 @@ def _function(name: str, symbols: Sequence[Any], parts: Sequence[Sequence[Any]])
 
 
 def _nonzero(table: Iterable[tuple[tuple[int, ...], Any]]) -> tuple[list[Any], list[Any]]:
-    kept = [(index, entry) for index, entry in table if entry != 0]
-    return [index for index, _ in kept], [entry for _, entry in kept]
+    nonzero = [(index, entry) for index, entry in table if entry != 0]
+    return [index for index, _ in nonzero], [entry for _, entry in nonzero]
 
 
 def _source(*parts: str) -> str:

@@ -346,12 +346,12 @@ class Field(Generic[AnyDefinition]):
             direction: of the parameters, shape (parameters,).
 
         """
-        both, i = np.zeros((2, now.size, now.size)), np.arange(self.size)
+        result, i = np.zeros((2, now.size, now.size)), np.arange(self.size)
         mixed = self._equations.by_parameter_and_argument(self._arguments(now, None), self._p)
         for (v, r, k), slope in mixed.items():
-            into = both[int(self._equations.arguments[k].delayed)]
+            into = result[int(self._equations.arguments[k].delayed)]
             into[i + v * self.size, self._inputs[k]] += slope * direction[self._columns[r]]
-        return both[0], both[1]
+        return result[0], result[1]
 
     def by_parameter(self, now: np.ndarray, past: np.ndarray | None = None) -> np.ndarray:
         """Return the derivative of the rates by the parameters, shape (..., d, parameters).

@@ -116,10 +116,10 @@ def for_legs(legs: int) -> Callable[[type[Any]], type[Any]]:
 
     """
     def decorate(network: type[Any]) -> type[Any]:
-        stated = network.fitted(legs)
+        attributes = network.fitted(legs)
         network.__annotations__ = {**vars(network).get('__annotations__', {}),
-                                   **dict.fromkeys(stated.pop('fields', ()), float)}
-        for name, value in stated.items():
+                                   **dict.fromkeys(attributes.pop('fields', ()), float)}
+        for name, value in attributes.items():
             if name not in vars(network):
                 setattr(network, name, value)
         return dataclass(frozen=True)(network)
@@ -144,8 +144,8 @@ def footfall_order(legs: Iterable[str], sides: Mapping[str, str], girdles: Mappi
     With more than four legs those of a side stay together, so that waves are seen.
     """
     # Legs stand from hind to fore: only their order distinguishes the middle pairs.
-    listed = list(legs)[::-1]
-    rank = [GIRDLES.index(girdles.get(leg, 'fore')) for leg in listed]
-    right = [sides.get(leg) == 'right' for leg in listed]
-    key = list(zip(right, rank, strict=True) if len(listed) > 4 else zip(rank, right, strict=True))
-    return [listed[k] for k in sorted(range(len(listed)), key=lambda k: key[k])]
+    order = list(legs)[::-1]
+    rank = [GIRDLES.index(girdles.get(leg, 'fore')) for leg in order]
+    right = [sides.get(leg) == 'right' for leg in order]
+    key = list(zip(right, rank, strict=True) if len(order) > 4 else zip(rank, right, strict=True))
+    return [order[k] for k in sorted(range(len(order)), key=lambda k: key[k])]

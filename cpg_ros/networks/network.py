@@ -222,10 +222,10 @@ class Network(NetworkDefinition):
         if any(len(cells) != 2 for cells in legs):
             return 'neither'
         pairs = [(a - 1, b - 1) for a, b in legs]
-        alike = all(symmetry.waves[a] == symmetry.waves[b] for a, b in pairs)
-        apart = {float((symmetry.phases[b] - symmetry.phases[a]) % 1.0) for a, b in pairs}
-        return ('run-like' if alike and apart == {0.0} else
-                'walk-like' if alike and apart == {0.5} else 'neither')
+        same_wave = all(symmetry.waves[a] == symmetry.waves[b] for a, b in pairs)
+        shifts = {float((symmetry.phases[b] - symmetry.phases[a]) % 1.0) for a, b in pairs}
+        return ('run-like' if same_wave and shifts == {0.0} else
+                'walk-like' if same_wave and shifts == {0.5} else 'neither')
 
 
 @cache
@@ -377,23 +377,23 @@ def stated_gait(network: Network) -> str:
 
 def other_gait(network: Network, gait: str) -> str:
     """Return the gait that a network's offsets state instead of another one, or ''."""
-    stated = stated_gait(network)
-    if stated in ('', gait):
+    gait_name = stated_gait(network)
+    if gait_name in ('', gait):
         return ''
-    if stated == network.unnamed:
-        return f"the offsets make no {gait} and no other gait with a name: it is '{stated}'"
-    return f"the offsets make the {stated}, not '{gait}'"
+    if gait_name == network.unnamed:
+        return f"the offsets make no {gait} and no other gait with a name: it is '{gait_name}'"
+    return f"the offsets make the {gait_name}, not '{gait}'"
 
 
 @lru_cache(maxsize=1024)
 def _nearest(network: type[Network], leads: tuple[float, ...]) -> str:
-    cells = [listed[0] - 1 for listed in next(iter(network.legs.values())).values()]
+    cells = [numbers[0] - 1 for numbers in next(iter(network.legs.values())).values()]
     presets = network.presets()
-    named = {gait: np.array(presets[gait].network.leads)[cells] for gait in network.gaits()
-             if gait != network.unnamed and gait in presets}
-    if not named or not np.isfinite(leads).all():
+    phases_of = {gait: np.array(presets[gait].network.leads)[cells] for gait in network.gaits()
+                 if gait != network.unnamed and gait in presets}
+    if not phases_of or not np.isfinite(leads).all():
         return network.unnamed
-    gait, distance, *_ = nearest_gait(np.array(leads)[cells], named)
+    gait, distance, *_ = nearest_gait(np.array(leads)[cells], phases_of)
     return gait if distance <= GAIT_TOLERANCE else network.unnamed
 
 

@@ -55,9 +55,9 @@ def _presets(args: Namespace) -> tuple[type[Network], dict[str, Preset], str]:
     name, file = args.network or DEFAULT_NETWORK, args.presets
     reader = None if file is None else YamlReader(file, 'preset file', PresetError, MAX_VALUE)
     tree = reader.tree() if reader else {}
-    fitted = tree.get('/**') if isinstance(tree, dict) else None
+    parameters = tree.get('/**') if isinstance(tree, dict) else None
     if reader and args.network is None:
-        inner = fitted.get('ros__parameters') if isinstance(fitted, dict) else tree
+        inner = parameters.get('ros__parameters') if isinstance(parameters, dict) else tree
         if not isinstance(inner, dict) or 'network' not in inner:
             raise reader.fail('network', 'is not given')
         name = reader.text(inner['network'], 'network')
@@ -68,7 +68,7 @@ def _presets(args: Namespace) -> tuple[type[Network], dict[str, Preset], str]:
                          ) from error
     if not reader:
         return kind, kind.presets(), kind.usual_gait
-    presets = read_presets(file, kind) if fitted is None else _fitted(reader, fitted, kind)
+    presets = read_presets(file, kind) if parameters is None else _fitted(reader, parameters, kind)
     return kind, presets, next(iter(presets)) if len(presets) == 1 else ''
 
 
@@ -126,7 +126,7 @@ def preset_from(args: Namespace) -> tuple[Preset, Network]:
     if network.delay > kind.longest_delay > 0.0:
         raise InputError(f'--set: {delay} is {network.delay:g}, delays go up to '
                          f'{kind.longest_delay:g}: use another unit of time')
-    for key, lost in kind.needed.items():
+    for key, purpose in kind.needed.items():
         if network.as_dict()[key] == 0.0:
-            raise InputError(f'--set: {key} is 0: {lost}')
+            raise InputError(f'--set: {key} is 0: {purpose}')
     return preset, network

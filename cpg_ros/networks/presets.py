@@ -107,8 +107,8 @@ def own_presets(network: type[AnyDefinition]) -> dict[str, Preset[AnyDefinition]
 
     """
     beside = Path(inspect.getfile(network)).with_suffix('.yaml')
-    shipped = resource_folder('config') / 'presets' / f'{network.name}.yaml'
-    return read_presets(beside if beside.is_file() else shipped, network)
+    path = resource_folder('config') / 'presets' / f'{network.name}.yaml'
+    return read_presets(beside if beside.is_file() else path, network)
 
 
 def write_presets(path: str | Path, network: type[AnyDefinition],

@@ -57,10 +57,10 @@ def definition_error(network: type[Network]) -> str:
     return next(chain(_names(network), _legs(network), _gaits(network)), '')
 
 
-def _unknown(where: str, names: Any, listed: Any) -> Iterator[str]:
+def _unknown(where: str, names: Any, known_names: Any) -> Iterator[str]:
     for name in names:
-        if name not in listed:
-            yield f"{where}: '{name}' is not one of {', '.join(map(str, listed))}"
+        if name not in known_names:
+            yield f"{where}: '{name}' is not one of {', '.join(map(str, known_names))}"
 
 
 def _names(network: type[Network]) -> Iterator[str]:
@@ -311,9 +311,9 @@ def _usable(source: str, load: Callable[[], Entry]) -> Entry:
 
 
 def _checked(source: str, network: type[Network]) -> type[Network]:
-    why = _usable(source, lambda: definition_error(network))
-    if why:
-        raise NetworkError(f'{source}: {why}')
+    reason = _usable(source, lambda: definition_error(network))
+    if reason:
+        raise NetworkError(f'{source}: {reason}')
     return network
 
 
@@ -345,9 +345,9 @@ def _of_file(path: Path) -> type[Network]:
                    if isinstance(value, type) and issubclass(value, Network)
                    and value.__module__ == name and not isabstract(value)]
         if len(classes) != 1:
-            listed = ', '.join(network.__name__ for network in classes)
+            names = ', '.join(network.__name__ for network in classes)
             raise NetworkError(f'{path}: it must define one class of networks, not '
-                               + (f'{len(classes)}: {listed}' if classes else 'none'))
+                               + (f'{len(classes)}: {names}' if classes else 'none'))
         network = _checked(str(path), classes[0])
         if network.name in NETWORKS:
             raise NetworkError(f"{path}: the name '{network.name}' is that of another network")

@@ -61,17 +61,17 @@ class Group:
         names, powers = [], []
         for name, generator in self.generators:
             power = tuple(range(self.cells))
-            listed: list[Permutation] = []
-            while not listed or power != listed[0]:
-                listed.append(power)
+            powers_of: list[Permutation] = []
+            while not powers_of or power != powers_of[0]:
+                powers_of.append(power)
                 power = compose(generator, power)
-            powers.append(listed)
-            names.append(['', name, *(f'{name}^{k}' for k in range(2, len(listed)))])
+            powers.append(powers_of)
+            names.append(['', name, *(f'{name}^{k}' for k in range(2, len(powers_of)))])
         named: dict[Permutation, str] = {}
-        for choice in product(*(range(len(listed)) for listed in powers)):
+        for choice in product(*(range(len(powers_of)) for powers_of in powers)):
             element = tuple(range(self.cells))
-            for listed, k in zip(powers, choice, strict=True):
-                element = compose(listed[k], element)
+            for powers_of, k in zip(powers, choice, strict=True):
+                element = compose(powers_of[k], element)
             name = ' '.join(names[g][k] for g, k in enumerate(choice) if k)
             named.setdefault(element, name or '1')
         # Of a group that is not abelian these products need not be all elements.
@@ -93,8 +93,8 @@ class Group:
     @cached_property
     def orbits(self) -> np.ndarray:
         """Number of each cell's orbit, from 0, shape (cells,): which cells change places."""
-        least = np.array(list(self.elements.values())).min(axis=0)
-        return np.unique(least, return_inverse=True)[1]
+        smallest = np.array(list(self.elements.values())).min(axis=0)
+        return np.unique(smallest, return_inverse=True)[1]
 
     def subgroup(self, names: 'Subgroup') -> 'Group':
         """Return a subgroup, given by all of its elements' names, as a group."""
@@ -299,16 +299,16 @@ class Symmetry(ShortRepr):
         The class is Fix(K), which the flow never leaves. With x -> -x, an element with shift 1/2
         fixes states in combination with the sign.
         """
-        still = [(self.group.elements[name], 1.0 if shift == 0 else -1.0)
-                 for name, shift in self.shifts
-                 if shift == 0 or (self.odd and shift == Fraction(1, 2))]
-        rows, seen = [], np.zeros(self.group.cells, dtype=bool)
+        stabiliser = [(self.group.elements[name], 1.0 if shift == 0 else -1.0)
+                      for name, shift in self.shifts
+                      if shift == 0 or (self.odd and shift == Fraction(1, 2))]
+        rows, covered = [], np.zeros(self.group.cells, dtype=bool)
         for cell in range(self.group.cells):
-            if not seen[cell]:
+            if not covered[cell]:
                 row = np.zeros(self.group.cells)
-                for element, sign in still:
+                for element, sign in stabiliser:
                     row[element[cell]] += sign
-                seen |= row != 0.0
+                covered |= row != 0.0
                 rows.append(row / np.linalg.norm(row))
         return np.kron(np.eye(self.variables), np.array(rows))
 

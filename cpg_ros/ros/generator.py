@@ -523,12 +523,12 @@ class Generator(StartedNode):
         """Give ``tick.c`` all that its ticks need until ``Ticker.attend``; see Ticker."""
         pattern, feedback = self.pattern.addresses, self._feedback.loop
         self.pattern.start_drift()
-        loop.asked = loop.advance = loop.resume = loop.correct = None
+        loop.attend = loop.advance = loop.resume = loop.correct = None
         loop.outputs[:] = [None] * len(loop.outputs)
         with ExitStack() as kept:
             if not self.ticker.paused:
                 self._sent = self.pattern.position
-                for name in ('asked', 'advance', 'resume', 'what'):
+                for name in ('attend', 'advance', 'resume', 'what'):
                     setattr(loop, name, pattern[name])
                 if feedback is not None:
                     self._sent = feedback.target

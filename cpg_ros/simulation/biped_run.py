@@ -34,8 +34,8 @@ import numpy as np
 #: MIN_HEIGHT: height of the centre of mass, as a fraction of the commanded one, below which the
 #: robot has fallen.
 MIN_HEIGHT = 0.6
-#: SETTLING_TIME: time after the first step from which on a run is measured, s.
-SETTLING_TIME = 3.0
+#: START_UP_TIME: time after the first step from which on a run is measured, s.
+START_UP_TIME = 3.0
 
 
 @dataclass(eq=False, repr=False)
@@ -44,10 +44,10 @@ class BipedOutcome(ShortRepr):
 
     Attributes:
         fell: when it fell, s, infinite if it did not.
-        speed: mean velocity forward and left, heading's axes, m/s, after SETTLING_TIME.
+        speed: mean velocity forward and left, heading's axes, m/s, after START_UP_TIME.
         tilt: largest angle of the base to the vertical, rad.
         steps: touchdowns by the clock.
-        flight: fraction of the time after SETTLING_TIME in which no foot touches the ground.
+        flight: fraction of the time after START_UP_TIME in which no foot touches the ground.
         cost: of transport: mechanical work of the motors, those of the arms too and none
             regained, per weight and metre.
         path: time, place of the base (x y z) and its yaw, every 10 ms, shape (n, 5).
@@ -164,7 +164,7 @@ class BipedRun:
             _, held_speeds, held_torques = body.held
             work += dt * float(motor_power(body.torque, body.velocity)
                                + motor_power(held_torques, held_speeds))
-            if time > began + SETTLING_TIME:
+            if time > began + START_UP_TIME:
                 c, s = math.cos(feedback.memory.heading), math.sin(feedback.memory.heading)
                 x, y = body.rates[:2]
                 moved += c * x + s * y, c * y - s * x

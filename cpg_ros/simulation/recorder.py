@@ -231,8 +231,8 @@ def without_opengl() -> str:
 
 def _opengl(width: int, height: int) -> Any:
     """Return a context of MUJOCO_GL's kind, or of the first that works without a screen."""
-    given = os.environ.get('MUJOCO_GL', '').strip().lower()
-    kinds = (given,) if given in ('egl', 'osmesa', 'glfw') else ('egl', 'osmesa')
+    setting = os.environ.get('MUJOCO_GL', '').strip().lower()
+    kinds = (setting,) if setting in ('egl', 'osmesa', 'glfw') else ('egl', 'osmesa')
     reasons = []
     for kind in kinds:
         # What is missing shows as almost any error, down to attributes of None. A failed

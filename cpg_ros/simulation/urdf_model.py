@@ -116,12 +116,12 @@ def possible(matrix: np.ndarray, mass: float, longest: float = math.inf
     if square > (MAX_GYRATION * longest)**2:
         return ball(mass) * np.eye(3), (
             f'needs parts {math.sqrt(square):.2g} m away, beside links of up to {longest:.2g} m')
-    held = np.maximum(sizes, MIN_MOMENT * sizes.sum())
-    if np.array_equal(held, sizes):
+    bounds = np.maximum(sizes, MIN_MOMENT * sizes.sum())
+    if np.array_equal(bounds, sizes):
         return matrix, ''
-    made = np.trace(np.diag(held)) * np.eye(3) - (axes * held) @ axes.T
+    tensor = np.trace(np.diag(bounds)) * np.eye(3) - (axes * bounds) @ axes.T
     broken = sizes[0] < -MOMENT_TOLERANCE * sizes.sum()
-    return made, 'breaks the triangle inequality (a + b >= c)' if broken else ''
+    return tensor, 'breaks the triangle inequality (a + b >= c)' if broken else ''
 
 
 def ball(mass: float) -> float:
@@ -272,13 +272,13 @@ class _Meshes:
 
 def _hold(robot: ElementTree.Element, driven: Collection[str], say: Say) -> None:
     """Fix joints that nothing drives."""
-    held = []
+    fixed_joints = []
     for joint in robot.findall('joint'):
         if joint.get('name') not in driven and joint.get('type') not in (FIXED, FLOATING):
             joint.set('type', FIXED)
-            held.append(joint.get('name', ''))
-    if held:
-        say(f'joints that the robot file does not drive are held at 0: {", ".join(held)}')
+            fixed_joints.append(joint.get('name', ''))
+    if fixed_joints:
+        say(f'joints that the robot file does not drive are held at 0: {", ".join(fixed_joints)}')
 
 
 def _weigh(robot: ElementTree.Element, say: Say) -> float:
@@ -297,12 +297,12 @@ def _weigh(robot: ElementTree.Element, say: Say) -> float:
     for name, mass in masses.items():
         link, inertial = links[name], links[name].find('inertial')
         if mass and inertial is not None:
-            made, wrong = possible(_inertia(inertial), mass, longest or math.inf)
+            inertia, wrong = possible(_inertia(inertial), mass, longest or math.inf)
             if wrong:
                 made_text = ', '.join(f'{key} {value:.3g}' for key, value in
-                                    zip(_INERTIA_KEYS, made[np.triu_indices(3)], strict=True))
+                                    zip(_INERTIA_KEYS, inertia[np.triu_indices(3)], strict=True))
                 repaired.setdefault((wrong, made_text), []).append(name)
-            _write(inertial, mass, made)
+            _write(inertial, mass, inertia)
             continue
         # As the format has it, no <inertial> means none; MuJoCo would take the shapes'.
         if inertial is not None:
@@ -331,14 +331,14 @@ def _carries(robot: ElementTree.Element, name: str, masses: dict[str, float]) ->
 
 def _mass(link: ElementTree.Element) -> float:
     """Return a link's mass in kg, 0 where it is nothing."""
-    given = link.find('inertial/mass')
-    mass = 0.0 if given is None else sum(numbers(given.get('value', '0'), 1))
+    element = link.find('inertial/mass')
+    mass = 0.0 if element is None else sum(numbers(element.get('value', '0'), 1))
     return mass if mass > MASS_TOLERANCE else 0.0
 
 
 def _inertia(inertial: ElementTree.Element) -> np.ndarray:
-    given = inertial.find('inertia')
-    xx, xy, xz, yy, yz, zz = (0.0 if given is None else sum(numbers(given.get(key, '0'), 1))
+    element = inertial.find('inertia')
+    xx, xy, xz, yy, yz, zz = (0.0 if element is None else sum(numbers(element.get(key, '0'), 1))
                               for key in _INERTIA_KEYS)
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
@@ -448,9 +448,9 @@ def _joined(robot: ElementTree.Element, name: str, parent: str, child: str,
 def _fill(robot: ElementTree.Element, model: Any, body: int, link: tuple[str, np.ndarray]) -> None:
     """Add a body's link, with mass and shapes, and the empty links of its further joints."""
     own, at = link
-    known = {one.get('name') for one in robot.iterfind('link')}
+    link_names = {one.get('name') for one in robot.iterfind('link')}
     for child in robot.findall('joint/child'):
-        if (name := child.get('link')) not in known and name != own:
+        if (name := child.get('link')) not in link_names and name != own:
             ElementTree.SubElement(robot, 'link', name=name or '')
     element = ElementTree.SubElement(robot, 'link', name=own)
     if model.body_mass[body]:

@@ -68,7 +68,7 @@ class Counter:
     def prepare(self, loop):
         loop.advance, loop.resume = (ctypes.cast(function, ctypes.c_void_p).value
                                      for function in self.functions)
-        loop.asked = ctypes.addressof(self.asked)
+        loop.attend = ctypes.addressof(self.asked)
         loop.outputs[:2] = [block.output(20.0) for block in self.blocks]
         if self.asked.value:
             self.asked.value = 0

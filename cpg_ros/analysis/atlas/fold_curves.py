@@ -396,16 +396,16 @@ def bautin_folds(job: tuple[ParameterPlane, Boundary]) -> list[Boundary]:
 
 def distinct(chart: ParameterPlane, curves: Iterable[Boundary]) -> list[Boundary]:
     """Leave out fold curves that run along one before them."""
-    kept: list[Boundary] = []
+    result: list[Boundary] = []
     for curve in curves:
         fractions = chart.fractions_of(curve.points)
         some = fractions[[len(fractions) * k // 4 for k in (1, 2, 3)]]
         if curve.kind != 'fold' or not any(
                 other.kind == 'fold' and other.gaits == curve.gaits
                 and all(other.passes(chart, fraction, BAUTIN_CURVE_TOLERANCE) for fraction in some)
-                for other in kept):
-            kept.append(curve)
-    return kept
+                for other in result):
+            result.append(curve)
+    return result
 
 
 def _born(chart: ParameterPlane, point: CodimensionTwo) -> Boundary | None:

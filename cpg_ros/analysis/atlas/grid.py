@@ -391,15 +391,15 @@ def _middles(top: int, bottom: int, left: int, right: int, corners: list[tuple[i
 def _near(sheet: GaitMap, row: int, columns: list[int], stride: int
           ) -> Iterator[tuple[int, int, list[list[float]], float]]:
     """Yield the closest orbits around each point of a row."""
-    seen = set()
+    visited = set()
     for column in columns:
         close = sorted((abs(r - row) + abs(c - column), r, c)
                        for r in range(max(0, row - stride), row + stride + 1)
                        for c in range(max(0, column - stride), column + stride + 1)
                        if (r, c) in sheet.waves)[:NUM_CORNERS]
         for _, r, c in close:
-            if (r, c) not in seen:
-                seen.add((r, c))
+            if (r, c) not in visited:
+                visited.add((r, c))
                 wave, period = sheet.waves[r, c]
                 yield r, c, wave, period
 

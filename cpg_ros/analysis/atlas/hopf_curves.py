@@ -199,10 +199,10 @@ class Boundary(ShortRepr):
         return arclength.on_curve(chart.fractions_of(self.points), point, reach)
 
     def __str__(self) -> str:
-        met = [name for name, soft in (('supercritical', True), ('subcritical', False))
-               if any(loss.soft is soft for loss in self.losses)]
+        kinds = [name for name, soft in (('supercritical', True), ('subcritical', False))
+                 if any(loss.soft is soft for loss in self.losses)]
         return (f'{self.kind} of {" and ".join(self.gaits)}'
-                + (f' ({" and ".join(met)})' if met else ''))
+                + (f' ({" and ".join(kinds)})' if kinds else ''))
 
 
 def _inside(fraction: np.ndarray) -> bool:

@@ -115,9 +115,9 @@ def draw_map(path: Path, chart: ParameterPlane, sheets: dict[str, GaitMap],
         panel.set_xlabel(str(chart.first.line))
     figure.supylabel(str(chart.second.line))
     kinds = [kind for kind in LINE_STYLES if any(curve.kind == kind for curve in curves)]
-    met = {point.kind for curve in curves for point in curve.codimension_two
-           if point.gait in sheets}
-    special = [kind for kind in LABELS if kind in met]
+    kinds_on_map = {point.kind for curve in curves for point in curve.codimension_two
+                    if point.gait in sheets}
+    special = [kind for kind in LABELS if kind in kinds_on_map]
     figure.legend(handles=[
         *(Patch(color=colour, label=text) for text, colour in STATE_COLOURS.items()),
         *(Line2D([], [], color=LINE_STYLES[kind][0], ls=LINE_STYLES[kind][1], label=kind)
@@ -171,8 +171,8 @@ class AtlasFolder:
         """Store the points of a job, and return them as get will."""
         text = json.dumps(points)
         write_atomically(self._place(row), text)
-        kept: list[dict[str, Any]] = json.loads(text)
-        return kept
+        entries: list[dict[str, Any]] = json.loads(text)
+        return entries
 
     def curves(self) -> list[Boundary] | None:
         """Return the boundaries, if they are done."""
@@ -233,12 +233,12 @@ def _packed(values: np.ndarray) -> str:
 
 def _waves(sheet: GaitMap, cells: int) -> list[Any]:
     """Row, column and cells over a cycle, of some points of the grid."""
-    waves, seen = [], set()
+    waves, visited = [], set()
     for (row, column), (wave, _) in sorted(sheet.waves.items()):
         tile = row // WAVEFORM_SPACING, column // WAVEFORM_SPACING
-        if tile in seen:
+        if tile in visited:
             continue
-        seen.add(tile)
+        visited.add(tile)
         x = np.array(wave)[:, :cells]
         some = x[::max(1, len(x) // WAVEFORM_POINTS)]
         waves.append([row, column, np.round(some - x.mean(axis=0), 3).T.tolist()])
@@ -277,9 +277,9 @@ def write_page(path: Path, chart: ParameterPlane, sheets: dict[str, GaitMap],
             for gait, sheet in sheets.items()}}
     data = json.dumps(atlas).replace('<', '\\u003c')
     kinds = {curve.kind for curve in curves}
-    met = {kind: colour for kind, (colour, _) in LINE_STYLES.items() if kind in kinds}
+    colours = {kind: colour for kind, (colour, _) in LINE_STYLES.items() if kind in kinds}
     key = ''.join(f'<span style="background:{colour}"></span>{text}'
-                  for text, colour in (STATE_COLOURS | met).items())
+                  for text, colour in (STATE_COLOURS | colours).items())
     listed = ''.join(
         f'<tr><td>{LABELS[point.kind]}</td><td>{point}</td></tr>'
         for point in {str(point): point for curve in curves

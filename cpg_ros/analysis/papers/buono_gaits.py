@@ -342,10 +342,10 @@ def legs() -> Iterator[ReproducedRow | Picture]:
         yield at.word(f'legs of cells 1 to 8, {name} network', printed, names[name])
     shared = PRINTED['table_3'].split()
     pairs = {frozenset(i for i in range(8) if shared[i] == leg) for leg in LEGS}
-    kept = all(frozenset(g[i] for i in pair) in pairs
-               for g in Z4_Z2.elements.values() for pair in pairs)
+    preserved = all(frozenset(g[i] for i in pair) in pairs
+                    for g in Z4_Z2.elements.values() for pair in pairs)
     yield Citation(AUTHORS, 'Table 3').holds(
-        'the assignment of Table 3 is none that eq. 3.2 allows', not kept)
+        'the assignment of Table 3 is none that eq. 3.2 allows', not preserved)
 
 
 # Buono & Golubitsky (2001), appendix A: Theorem A.1 with its conditions, by computation.
@@ -385,10 +385,10 @@ class Action:
         isotropy = all(np.abs(self.matrix(g) @ points - points).max() > ZERO_TOLERANCE
                        for g in self.group - k)
         dimension = basis.shape[1]
-        met = {'A.2': isotropy, 'A.3': dimension >= 2,
-               'A.5': isotropy and self._keeps_a_component(k, h, basis, points),
-               'A.6': dimension != 2 or h in (k, self.normaliser(k))}
-        return [name for name in CONDITIONS if not met[name]]
+        conditions = {'A.2': isotropy, 'A.3': dimension >= 2,
+                      'A.5': isotropy and self._keeps_a_component(k, h, basis, points),
+                      'A.6': dimension != 2 or h in (k, self.normaliser(k))}
+        return [name for name in CONDITIONS if not conditions[name]]
 
     def _keeps_a_component(self, k: Subgroup, h: Subgroup, basis: np.ndarray, points: np.ndarray
                            ) -> bool:
@@ -402,10 +402,10 @@ class Action:
         if not normals:
             return True
         signs = np.sign(np.array(normals) @ points)
-        kept = np.ones(points.shape[1], dtype=bool)
+        fixed = np.ones(points.shape[1], dtype=bool)
         for g in h:
-            kept &= (np.sign(np.array(normals) @ (self.matrix(g) @ points)) == signs).all(axis=0)
-        return bool(kept.any())
+            fixed &= (np.sign(np.array(normals) @ (self.matrix(g) @ points)) == signs).all(axis=0)
+        return bool(fixed.any())
 
 
 def of_cells(group: Subgroup, variables: int) -> Action:

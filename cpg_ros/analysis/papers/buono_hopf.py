@@ -428,7 +428,7 @@ def theorem_verdict(network: Quadruped, gait: str) -> TheoremVerdict:
     signs = [('alpha', along, network.alpha), ('gamma', across, network.gamma)]
     condition = ' and '.join(f'{name} {">" if sign > 0 else "<"} 0'
                              for name, sign, _ in signs if sign)
-    met = all(sign * value > 0.0 for _, sign, value in signs if sign)
+    holds = all(sign * value > 0.0 for _, sign, value in signs if sign)
 
     overlooked = []
     split = blocks(network, equilibrium(network))
@@ -437,7 +437,7 @@ def theorem_verdict(network: Quadruped, gait: str) -> TheoremVerdict:
     # For beta = alpha all real blocks have the discriminant of the critical one.
     if mirror < 0 and any(block.real and block.leading.imag == 0.0 for block in split):
         overlooked.append('the real blocks have complex eigenvalues')
-    return TheoremVerdict(gait, tuple(unmet), condition, met, tuple(overlooked))
+    return TheoremVerdict(gait, tuple(unmet), condition, holds, tuple(overlooked))
 
 
 # Buono & Golubitsky (2001), sections 4 and 5: claims of the proofs.
@@ -566,7 +566,7 @@ def necessary_and_sufficient() -> Iterator[ReproducedRow | Picture]:
                   for alpha, point in points[mirror] if point.gait == gait
                  # 'We always refer to the eigenvalue with greatest real part' (section 5.3).
                   and point.block.roots(2).real.max() < AXIS_TOLERANCE]
-        otherwise = sum(met != stable for met, stable in agreed)
+        otherwise = sum(predicted != stable for predicted, stable in agreed)
         yield Citation(AUTHORS, 'Theorem 4.2').holds(
             f'{gait}: the conditions are necessary and sufficient at equal couplings',
             bool(agreed) and not otherwise, erratum=23 if mirror < 0 else None,

@@ -95,7 +95,7 @@ def published_normal_form(point: HopfPoint) -> NormalForm:
 
 
 #: Model times in which a gait develops, and which is drawn.
-SETTLING_TIME, FIGURE_TIME = 120.0, 20.0
+TRANSIENT_TIME, FIGURE_TIME = 120.0, 20.0
 #: Start values printed under Figures 3 and 4.
 START_VALUES = (0.1, -0.1, 0.2, -0.2, 0.1, -0.1, 0.2, -0.2)
 
@@ -196,26 +196,26 @@ def _simulated(example: Example) -> Iterator[ReproducedRow | Picture]:
     gait, figure = example.gait, f'Figure {example.figure}'
     at = Citation(AUTHORS, figure)
     gaits = primary_gaits(variables=1)
-    seen = rhythm(example.network, example.start, SETTLING_TIME, Z4_Z2, gaits)
-    phases = f'phases of cells 1 to 4: {np.round(seen.end.phases[:4], 4) % 1.0}'
-    yield at.word('gait that the printed start values lead to', gait, seen.kind,
+    result = rhythm(example.network, example.start, TRANSIENT_TIME, Z4_Z2, gaits)
+    phases = f'phases of cells 1 to 4: {np.round(result.end.phases[:4], 4) % 1.0}'
+    yield at.word('gait that the printed start values lead to', gait, result.kind,
                   erratum=example.wrong_start, note=phases)
-    caption = f'From the printed start values: {seen.kind}.'
+    caption = f'From the printed start values: {result.kind}.'
     if example.wrong_start:
-        seen = rhythm(example.network, START_VALUES, SETTLING_TIME, Z4_Z2, gaits)
-        yield at.word('gait that the start values of Figures 3 and 4 lead to', gait, seen.kind,
+        result = rhythm(example.network, START_VALUES, TRANSIENT_TIME, Z4_Z2, gaits)
+        yield at.word('gait that the start values of Figures 3 and 4 lead to', gait, result.kind,
                       note='0.1, -0.1, 0.2, -0.2, 0.1, -0.1, 0.2, -0.2')
         caption = (f'From the start values of Figure 3, as those printed lead to another gait '
-                   f'(erratum {example.wrong_start[0]}): {seen.kind}.')
+                   f'(erratum {example.wrong_start[0]}): {result.kind}.')
     if example.gait == 'walk':
         # + : cell 3, of LF, leads cell 1, of LH, by a quarter.
-        sense = {'walk-': 'walk', 'walk+': 'diagonal-sequence walk'}.get(seen.gait, seen.gait)
+        sense = {'walk-': 'walk', 'walk+': 'diagonal-sequence walk'}.get(result.gait, result.gait)
         yield at.word('walk as quadrupeds walk: LH, LF, RH, RF', 'walk', sense,
                       erratum=(7, 'diagonal-sequence walk'), note=phases)
-    drawn = seen.run.t <= FIGURE_TIME
+    drawn = result.run.t <= FIGURE_TIME
     yield Picture(AUTHORS, figure, caption, trajectories(
-        f'{AUTHORS}, {figure}: {seen.kind}, tau {example.network.tau:g}', seen.run.t[drawn],
-        seen.run.x[drawn, :4], ('$x_1$ (LH)', '$x_2$ (RH)', '$x_3$ (LF)', '$x_4$ (RF)')))
+        f'{AUTHORS}, {figure}: {result.kind}, tau {example.network.tau:g}', result.run.t[drawn],
+        result.run.x[drawn, :4], ('$x_1$ (LH)', '$x_2$ (RH)', '$x_3$ (LF)', '$x_4$ (RF)')))
 
 
 def conditions() -> Iterator[ReproducedRow | Picture]:

@@ -86,12 +86,12 @@ def after(before: str, gait: str) -> Rhythm:
     return simulated(cast(Biped, Biped.presets()[gait].network), disturbed(before))
 
 
-def signals(seen: Rhythm) -> list[str]:
+def signals(result: Rhythm) -> list[str]:
     """Name the cells' signals as Table 5 does: y1 and y2 for waveforms, +0.5 for a shift.
 
     Measured on the mean cycle: cells whose waveforms agree after the best shift have one name.
     """
-    cycle = seen.cycle.signals[:, :4]
+    cycle = result.cycle.signals[:, :4]
     first: list[int] = []
     names = []
     for cell in range(4):
@@ -152,11 +152,11 @@ def _oscillates(sign: float) -> bool:
 def primary() -> Iterator[ReproducedRow | Picture]:
     """Tables 2, 3 and 5, Figures 2 to 6, equations 6 to 9: the four primary gaits."""
     for gait in PRIMARY:
-        seen, figure = settled(gait), PRINTED['figures'][gait]
-        name, phases = named(gait), seen.end.phases
+        result, figure = settled(gait), PRINTED['figures'][gait]
+        name, phases = named(gait), result.end.phases
         at = Citation(AUTHORS, 'Table 2')
-        yield at.word('gait with I, phi and w_a, w_b, w_c of the ' + name, name, named(seen.gait),
-                      note=f'period {seen.cycle.period:.4f}')
+        yield at.word('gait with I, phi and w_a, w_b, w_c of the ' + name, name,
+                      named(result.gait), note=f'period {result.cycle.period:.4f}')
         yield at.stable(f'the {name} attracts',
                         multipliers(solve_orbit(printed(gait), gait)).leading)
         at = Citation(AUTHORS, 'Figure 2')
@@ -173,7 +173,7 @@ def primary() -> Iterator[ReproducedRow | Picture]:
                 f'objective z_{n} of the {name} [degrees], which is to vanish', '0.00', off,
                 within=OBJECTIVE_TOLERANCE, erratum=(8, '180'),
                 note=f'phase of cell {n + 1} {360.0 * phase:.2f}')
-        yield from _table_5(gait, seen)
+        yield from _table_5(gait, result)
         start = simulated(printed(gait), tuple(np.ravel(PRINTED['table_3'][gait]).tolist()))
         yield Citation(AUTHORS, 'Table 3').word(
             f'gait from the initial values of the {name}', name, named(start.gait),
@@ -206,19 +206,19 @@ def search() -> Iterator[ReproducedRow | Picture]:
             note=f'z_1 to z_3 with these {", ".join(f"{error:.2f}" for error in theirs)}')
 
 
-def _table_5(gait: str, seen: Rhythm) -> Iterator[ReproducedRow]:
+def _table_5(gait: str, result: Rhythm) -> Iterator[ReproducedRow]:
     at, name = Citation(AUTHORS, 'Table 5'), named(gait)
     h, k, response = PRINTED['table_5'][gait]
-    yield at.word(f'H of the {name}', h, _written(seen.end.h))
-    yield at.word(f'K of the {name}', k, _written(seen.end.k))
+    yield at.word(f'H of the {name}', h, _written(result.end.h))
+    yield at.word(f'K of the {name}', k, _written(result.end.k))
     yield at.word(f'signals of cells 1 to 4 in the {name}', response,
-                  f'({", ".join(signals(seen))})')
+                  f'({", ".join(signals(result))})')
 
 
-def _drawn(figure: str, name: str, seen: Rhythm, caption: str) -> Picture:
-    run = seen.run
-    late = run.t >= run.t[-1] - 5.0 * seen.cycle.period
-    shapes = [int(signal[1]) - 1 for signal in signals(seen)]
+def _drawn(figure: str, name: str, result: Rhythm, caption: str) -> Picture:
+    run = result.run
+    late = run.t >= run.t[-1] - 5.0 * result.cycle.period
+    shapes = [int(signal[1]) - 1 for signal in signals(result)]
     return Picture(AUTHORS, figure, caption, trajectories(
         f'{AUTHORS}, {figure}: {name}', run.t[late] - run.t[late][0], run.x[late, :4], NAMES,
         shapes, variable='v'))
@@ -227,26 +227,26 @@ def _drawn(figure: str, name: str, seen: Rhythm, caption: str) -> Picture:
 def secondary() -> Iterator[ReproducedRow | Picture]:
     """Tables 4 and 5, Figures 8 to 11: the secondary gaits. Their weights are not printed."""
     for gait in PRINTED['table_4']:
-        seen, name = settled(gait), named(gait)
-        one, two, three, four = signals(seen)
+        result, name = settled(gait), named(gait)
+        one, two, three, four = signals(result)
         yield Citation(AUTHORS, 'Table 4').word(
             f'signals in the {name}, left and right leg', PRINTED['table_4'][gait],
             f'({one}, {three}), ({two}, {four})', note='weights are ours: none are printed')
         if gait in PRINTED['table_5']:
-            yield from _table_5(gait, seen)
+            yield from _table_5(gait, result)
         if gait in PRINTED['not_reached']:
             roots = multipliers(solve_orbit(Biped.presets()[gait].network, gait))
-            reached = seen.gait == gait and roots.attracts
+            reached = result.gait == gait and roots.attracts
             yield Citation(AUTHORS, 'section 5').word(
                 f'the {name} in this network', 'not reached',
                 'reached' if reached else 'not reached', erratum=(18, 'reached'),
                 note=f'leading Floquet multiplier {roots.leading:.3g} a cycle')
     for number, (before, gait) in PRINTED['transitions'].items():
-        seen = after(before, gait)
+        result = after(before, gait)
         yield Citation(AUTHORS, f'Figure {number}').word(
             f'gait that follows the {named(before)} with other weights', named(gait),
-            named(seen.gait), note='weights are ours: none are printed')
-        yield _drawn(f'Figure {number}', f'{named(gait)}, from the {named(before)}', seen,
+            named(result.gait), note='weights are ours: none are printed')
+        yield _drawn(f'Figure {number}', f'{named(gait)}, from the {named(before)}', result,
                      'With weights of ours, as the paper prints none; settled.')
 
 
@@ -255,17 +255,17 @@ def predicted() -> Iterator[ReproducedRow | Picture]:
     at = Citation(AUTHORS, 'section 5')
     for before, gait in (*PRINTED['transitions'].values(), *PRINTED['predicted']):
         whole = D2.generated(GAITS[before])
-        kept = {name: shift for name, shift in D2.generated(GAITS[gait]).items() if name != '1'}
+        h = {name: shift for name, shift in D2.generated(GAITS[gait]).items() if name != '1'}
         yield at.holds(f'the {named(gait)} keeps symmetries of the {named(before)}, and no others',
-                       bool(kept) and all(whole[name] == shift for name, shift in kept.items()),
-                       note=', '.join(f'{name} by {shift}' for name, shift in kept.items()))
+                       bool(h) and all(whole[name] == shift for name, shift in h.items()),
+                       note=', '.join(f'{name} by {shift}' for name, shift in h.items()))
     for before, gait in PRINTED['predicted']:
-        seen = after(before, gait)
+        result = after(before, gait)
         note = 'weights are ours: none are printed'
         yield at.word(f'gait that follows the {named(before)}, as predicted', named(gait),
-                      named(seen.gait), note=note)
+                      named(result.gait), note=note)
         yield at.word(f'the {named(gait)} by way of the {named(before)}', 'not reached',
-                      'reached' if seen.gait == gait else 'not reached', erratum=(26, 'reached'),
+                      'reached' if result.gait == gait else 'not reached', erratum=(26, 'reached'),
                       note=note)
 
 

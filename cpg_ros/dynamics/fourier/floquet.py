@@ -49,7 +49,7 @@ def adjoint(orbit: FourierOrbit) -> Waveforms:
     """
     symmetry = orbit.symmetry
     u = rows_of(orbit.network, symmetry, orbit.cycle(orbit.samples))
-    alike = np.repeat(np.bincount(symmetry.waves), orbit.network.variables)[:, None]
+    class_sizes = np.repeat(np.bincount(symmetry.waves), orbit.network.variables)[:, None]
     while True:
         rows, n = u.shape
         _, jacobian, _ = equations(orbit.network, symmetry, u, orbit.period)
@@ -60,7 +60,7 @@ def adjoint(orbit: FourierOrbit) -> Waveforms:
         except np.linalg.LinAlgError as error:
             raise NoOrbit(NOT_ISOLATED) from error
         # A rate p added to one wave at all times changes 1/T by the mean of z p over its cells.
-        values = -n * by_residual / (alike * orbit.period**2)
+        values = -n * by_residual / (class_sizes * orbit.period**2)
         if max(collocation.tail(row) for row in values) <= HARMONIC_TOLERANCE:
             break
         if n >= 2 * MAX_NODES:

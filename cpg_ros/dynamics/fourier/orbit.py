@@ -278,7 +278,7 @@ def rows_of(network: Network, symmetry: Symmetry, states: np.ndarray) -> np.ndar
 
 
 def equations(network: Network, symmetry: Symmetry, u: np.ndarray, period: float,
-              given: Basis | None = None) -> tuple[np.ndarray, Any, Point]:
+              waveform_basis: Basis | None = None) -> tuple[np.ndarray, Any, Point]:
     """Evaluate the equations on the nodes and the phase condition.
 
     Args:
@@ -286,14 +286,14 @@ def equations(network: Network, symmetry: Symmetry, u: np.ndarray, period: float
         symmetry: of the gait.
         u: waveforms on the nodes, a row for each variable of each wave, shape (rows, n).
         period: in model time.
-        given: basis of the waveforms, by default n even nodes.
+        waveform_basis: basis of the waveforms, by default n even nodes.
 
     Returns:
         Residual (rows n + 1,), its Jacobian in (u, T), and what ``by_parameter`` needs.
 
     """
     rows, n = u.shape
-    basis: Basis = given or Nodes(n)
+    basis: Basis = waveform_basis or Nodes(n)
     variables, tau, kind = network.variables, network.delay, equations_of(type(network))
     waves, derive = rows // variables, basis.derive
     rise, inputs = (derive @ u.T).T, _inputs(type(network), symmetry)
@@ -350,9 +350,9 @@ def by_parameter(network: Network, symmetry: Symmetry, point: Point) -> np.ndarr
 
 
 def complete(network: Network, symmetry: Symmetry, u: np.ndarray, period: float,
-             jacobian: Any, point: Point, given: Basis | None = None) -> FourierOrbit:
+             jacobian: Any, point: Point, waveform_basis: Basis | None = None) -> FourierOrbit:
     """Complete a solution by its derivatives; jacobian and point are results of equations."""
-    basis: Basis = given or Nodes(u.shape[1])
+    basis: Basis = waveform_basis or Nodes(u.shape[1])
     derivatives = -basis.solve(jacobian, by_parameter(network, symmetry, point))
     names = network.parameters()
     # The equations of one cell contain only the weights of its own inputs.

@@ -81,8 +81,8 @@ def _lane_sources(network: type[Network], lanes: int) -> dict[str, str]:
 def version() -> str:
     """Return a digest of everything from which the C is generated, and of the processor."""
     processor = Path('/proc/cpuinfo')
-    known = processor.read_text() if processor.exists() else ''
-    flags = next((line for line in known.splitlines() if line.startswith('flags')), '')
+    model = processor.read_text() if processor.exists() else ''
+    flags = next((line for line in model.splitlines() if line.startswith('flags')), '')
     digest = hashlib.sha256((platform.machine() + flags).encode())
     for source in sorted(FOLDER.parent.rglob('*.[chp]*')):
         if source.suffix in ('.c', '.h', '.py'):

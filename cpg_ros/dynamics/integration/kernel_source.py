@@ -75,9 +75,9 @@ class LoopProgram:
             if len(sources) == 1 and len(inputs) == len(part.free_symbols):
                 # Computed where the cell is whose state it reads.
                 source = sources.pop()
-                there = part.xreplace({symbol: self.own(argument.variable)
-                                       for symbol, argument in self._arguments.items()})
-                result = self._function(self._inner(there))
+                replacement = part.xreplace({symbol: self.own(argument.variable)
+                                             for symbol, argument in self._arguments.items()})
+                result = self._function(self._inner(replacement))
                 return result if source is None else self._fetch(result, source)
             return self._function(part.func(*(self.lowered(arg) for arg in part.args)))
         return part.func(*(self.lowered(arg) for arg in part.args))

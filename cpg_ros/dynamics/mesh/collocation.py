@@ -189,8 +189,8 @@ def transfer(jacobians: np.ndarray, lengths: np.ndarray, sources: np.ndarray) ->
     """
     n, s, d, k = sources.shape
     answers, work = np.empty((n, s, d, d + k)), np.empty((s * d, s * d + d + k))
-    given = [np.ascontiguousarray(array) for array in (A, lengths, jacobians, sources)]
-    if not solver().mesh_transfer(n, s, d, k, *addresses(*given, work, answers)):
+    arrays = [np.ascontiguousarray(array) for array in (A, lengths, jacobians, sources)]
+    if not solver().mesh_transfer(n, s, d, k, *addresses(*arrays, work, answers)):
         raise np.linalg.LinAlgError('an interval is singular')
     return answers
 
@@ -199,8 +199,8 @@ def summed(jacobians: np.ndarray, lengths: np.ndarray, answers: np.ndarray) -> n
     """Integrate ``J dY`` over every interval, dY the answers at the nodes, (n, d, k)."""
     n, s, d, k = answers.shape
     steps = np.zeros((n, d, k))
-    given = [np.ascontiguousarray(array) for array in (lengths, jacobians, answers)]
-    solver().mesh_sum(n, s, d, k, *addresses(WEIGHTS, *given, steps))
+    arrays = [np.ascontiguousarray(array) for array in (lengths, jacobians, answers)]
+    solver().mesh_sum(n, s, d, k, *addresses(WEIGHTS, *arrays, steps))
     return steps
 
 

@@ -95,8 +95,8 @@ def _on_mesh(orbit: MeshOrbit, mesh: np.ndarray) -> tuple[np.ndarray, np.ndarray
     coefficients = collocation.power_coefficients(points[::-1][:-1], slopes, lengths)
     ends = collocation.last_fraction(slopes) * lengths / np.abs(points).max()
     # The cells of a class share its response.
-    alike = np.tile(np.bincount(orbit.symmetry.classes), orbit.network.variables)
-    return coefficients / alike, ends > INTERVAL_TOLERANCE
+    class_sizes = np.tile(np.bincount(orbit.symmetry.classes), orbit.network.variables)
+    return coefficients / class_sizes, ends > INTERVAL_TOLERANCE
 
 
 # Eigenvalues of a product of many matrices, each relative to its own size.
@@ -168,7 +168,7 @@ def multipliers(orbit: MeshOrbit) -> tuple[np.ndarray, tuple[np.ndarray, ...], f
     sizes = np.linalg.norm(rates, axis=1)
     along = rates / sizes[:, None]
     # Growth along the flow: 1 up to the error of the collocation.
-    kept = np.einsum('ni,nij,nj->n', along[1:], steps, along[:-1]) * sizes[:-1] / sizes[1:]
+    along_flow = np.einsum('ni,nij,nj->n', along[1:], steps, along[:-1]) * sizes[:-1] / sizes[1:]
     across = _across(along)
     inner = across[1:].transpose(0, 2, 1) @ steps @ across[:-1]
     back = across[0].T @ change.T @ across[-1]
@@ -180,7 +180,7 @@ def multipliers(orbit: MeshOrbit) -> tuple[np.ndarray, tuple[np.ndarray, ...], f
         # After m changes a cell is another one of its class.
         again = np.linalg.matrix_power(change, m)
         transverse.append(eigenvalues(np.concatenate([*[steps, change.T[None]] * m, again[None]])))
-    return roots, tuple(transverse), float(np.prod(kept)**m)
+    return roots, tuple(transverse), float(np.prod(along_flow)**m)
 
 
 class Flow:
@@ -310,8 +310,8 @@ class Variational:
     @property
     def unusable(self) -> str:
         """Reason why derivatives of the rates do not describe disturbances, or ''."""
-        met = bool(self._orbit.network.kinks) and kinks(self._reduced, self._orbit.solution).size
-        return 'the rates have kinks' if met else ''
+        kink = bool(self._orbit.network.kinks) and kinks(self._reduced, self._orbit.solution).size
+        return 'the rates have kinks' if kink else ''
 
     def critical(self, part: int, multiplier: complex) -> tuple[complex, np.ndarray]:
         """Return the factor over T/m of the disturbance with a multiplier, and a guess at it.
@@ -361,8 +361,8 @@ class Variational:
 
     def _inner(self, rates: np.ndarray) -> np.ndarray:
         n, s, d = self._shape
-        given = self._lengths[:, None, None] * np.einsum('pq,iqd->ipd', collocation.A, rates)
-        return (self._inverse @ given.reshape(n, s * d, 1)).reshape(n, s, d)
+        sources = self._lengths[:, None, None] * np.einsum('pq,iqd->ipd', collocation.A, rates)
+        return (self._inverse @ sources.reshape(n, s * d, 1)).reshape(n, s, d)
 
     def values(self, unknowns: np.ndarray, rates: np.ndarray, factor: complex) -> States:
         """Return a solution at the nodes, now and a delay ago.

@@ -90,7 +90,7 @@ class BalancedPattern(Pattern):
             if feedback is not self._feedback:
                 self.prepare(feedback)
             self._drift.clear()
-            self._asked.value = 0
+            self._request.value = 0
             self._know(feedback)
         self._state.wanted = feedback is not None
 

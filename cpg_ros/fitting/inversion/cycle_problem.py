@@ -24,7 +24,7 @@ from cpg_ros.dynamics.orbit import Orbit
 from cpg_ros.dynamics.solve_orbit import solve_beside, solve_orbit
 from cpg_ros.fitting.inversion.fit_data import (
     basis,
-    basis_moved,
+    basis_slope,
     Joints,
     NUM_WEIGHTS,
     project,
@@ -76,13 +76,13 @@ class Orbits:
 
     Attributes:
         solved: the latest orbits.
-        held: orbits that are kept as starts.
+        pinned: orbits that are kept as starts.
         missing: reasons why there is no orbit.
 
     """
 
     solved: dict[bytes, tuple[Orbit, Signals]] = field(default_factory=dict)
-    held: dict[bytes, tuple[Orbit, Signals]] = field(default_factory=dict)
+    pinned: dict[bytes, tuple[Orbit, Signals]] = field(default_factory=dict)
     missing: dict[bytes, str] = field(default_factory=dict)
 
 
@@ -129,7 +129,7 @@ class CycleProblem:
         #: Whether the feet bore loads, which move joints off what the network does.
         self.loaded = False
         self._orbits = orbits or Orbits()
-        self._placed: tuple[bytes, ReadoutFit] | None = None
+        self._best: tuple[bytes, ReadoutFit] | None = None
 
     def duty(self, values: np.ndarray) -> float | None:
         """Return the duty factor that the fit applies; None for that of the cells."""
@@ -166,7 +166,7 @@ class CycleProblem:
 
     def hold(self, values: np.ndarray) -> None:
         """Keep the orbit at these values as a start, as Newton's method may not reach it later."""
-        self._orbits.held[values[:self._own].tobytes()] = self._solve(values)
+        self._orbits.pinned[values[:self._own].tobytes()] = self._solve(values)
 
     def _solve(self, values: np.ndarray) -> tuple[Orbit, Signals]:
         """Solve for an orbit from the nearest known one; also return the signals of the joints.
@@ -176,24 +176,24 @@ class CycleProblem:
 
         """
         key = values[:self._own].tobytes()
-        solved, held, missing = vars(self._orbits).values()
-        if key in held:
-            return held[key]
-        if key not in solved:
+        orbits, pinned, missing = vars(self._orbits).values()
+        if key in pinned:
+            return pinned[key]
+        if key not in orbits:
             network = self._network(values)
-            near = self._nearest(values)
-            if near is None or network.delay_parameter:
+            nearest = self._nearest(values)
+            if nearest is None or network.delay_parameter:
                 # With a delay the way from the onset is as short as that from a neighbour.
-                return self._keep(values, solve_orbit(network, self.gait, near))
+                return self._keep(values, solve_orbit(network, self.gait, nearest))
             if key in missing:
                 raise NoOrbit(missing[key])
             try:
                 # A step too long for Newton's method is one too long for the trust region.
-                return self._keep(values, solve_beside(network, near))
+                return self._keep(values, solve_beside(network, nearest))
             except NoOrbit as error:
                 missing[key] = str(error)
                 raise
-        return solved[key]
+        return orbits[key]
 
     def _nearest(self, values: np.ndarray) -> Orbit | None:
         if not self._orbits.solved:
@@ -206,11 +206,11 @@ class CycleProblem:
     def best_readouts(self, values: np.ndarray) -> ReadoutFit:
         """Return the readouts that fit best; raise NoOrbit as ``begin`` does."""
         key = np.asarray(values).tobytes()
-        if self._placed is None or self._placed[0] != key:
-            orbit, seen = self._solve(values)
-            self._placed = key, ReadoutFit(orbit, *self._read(orbit, seen, values, self._members,
-                                                              self._of_duty))
-        return self._placed[1]
+        if self._best is None or self._best[0] != key:
+            orbit, signals = self._solve(values)
+            self._best = key, ReadoutFit(orbit, *self._readouts(
+                orbit, signals, values, self._members, self._of_duty))
+        return self._best[1]
 
     def by_waveform(self, values: np.ndarray) -> np.ndarray:
         """Return the derivative of the residual by errors of the waveforms, rad.
@@ -219,23 +219,23 @@ class CycleProblem:
         waveform, relative to half its range. Readouts are refitted. The shape is (m, joints,
         terms).
         """
-        orbit, seen = self._solve(values)
-        waves, count = len(seen.terms), min(ERROR_HARMONICS, seen.terms.shape[1] - 1) + 1
-        slopes = np.zeros((waves, seen.terms.shape[1], waves, 2, count), dtype=complex)
+        orbit, signals = self._solve(values)
+        waves, count = len(signals.terms), min(ERROR_HARMONICS, signals.terms.shape[1] - 1) + 1
+        slopes = np.zeros((waves, signals.terms.shape[1], waves, 2, count), dtype=complex)
         for wave in range(waves):
             slopes[wave, :count, wave] = np.eye(count)[:, None] * np.array([1.0, -1j])[:, None]
-        slopes = slopes.reshape(*seen.terms.shape, -1)
+        slopes = slopes.reshape(*signals.terms.shape, -1)
         terms = slopes.shape[-1]
-        return self._read(orbit, Signals(seen.terms, slopes), values, np.eye(terms),
-                          np.zeros(terms))[2][..., :-1]
+        return self._readouts(orbit, Signals(signals.terms, slopes), values, np.eye(terms),
+                              np.zeros(terms))[2][..., :-1]
 
     @property
     def noise(self) -> float:
         """Sum of squares of the weighted residual that noise alone would leave."""
         return (len(self.joints.data) - self.weights) * float(np.sum(
-            (self.joints.stated / self.sizes)**2))
+            (self.joints.errors / self.sizes)**2))
 
-    def left(self, values: np.ndarray) -> np.ndarray:
+    def residual_rms(self, values: np.ndarray) -> np.ndarray:
         """Return the RMS residual of each joint by its degrees of freedom, rad, (joints,)."""
         residual = self.best_readouts(values).residual
         return np.sqrt(np.sum(residual**2, axis=0) / (len(residual) - self.weights))
@@ -245,13 +245,13 @@ class CycleProblem:
         duty = self.duty(values)
         if duty is not None:
             return duty
-        orbit, seen = self._solve(values)
-        return self._own_stance(orbit, seen, int(orbit.waves[self._leads[0]])).fraction
+        orbit, signals = self._solve(values)
+        return self._own_stance(orbit, signals, int(orbit.waves[self._leads[0]])).fraction
 
-    def _own_stance(self, orbit: Orbit, seen: Signals, wave: int) -> OwnStance:
-        return own_stance(seen, wave, orbit.network.readout == 'waveform', self.readout.stance)
+    def _own_stance(self, orbit: Orbit, signals: Signals, wave: int) -> OwnStance:
+        return own_stance(signals, wave, orbit.network.readout == 'waveform', self.readout.stance)
 
-    def _phases(self, orbit: Orbit, seen: Signals, values: np.ndarray, members: np.ndarray,
+    def _phases(self, orbit: Orbit, signals: Signals, values: np.ndarray, members: np.ndarray,
                 of_duty: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the phases of the cells at which joints are read, and their derivatives.
 
@@ -259,31 +259,31 @@ class CycleProblem:
         """
         duty, cells = self.duty(values), orbit.phases[self._cells]
         phases = self.joints.theta + (cells + values[-1])[:, None]
-        moved, steep = np.zeros((*phases.shape, of_duty.size)), np.ones_like(phases)
+        slope, steep = np.zeros((*phases.shape, of_duty.size)), np.ones_like(phases)
         ahead, waves = (cells - orbit.phases[self._leads])[:, None], orbit.waves[self._leads]
         if duty is None:
-            return phases, moved, steep
+            return phases, slope, steep
         for wave in np.unique(waves):
-            rows, own = waves == wave, self._own_stance(orbit, seen, int(wave))
-            phases[rows], moved[rows], steep[rows] = retimed(phases[rows], duty, own, ahead[rows],
-                                                             members, of_duty)
-        return phases, moved, steep
+            rows, stance = waves == wave, self._own_stance(orbit, signals, int(wave))
+            phases[rows], slope[rows], steep[rows] = retimed(phases[rows], duty, stance,
+                                                             ahead[rows], members, of_duty)
+        return phases, slope, steep
 
-    def _read(self, orbit: Orbit, seen: Signals, values: np.ndarray, members: np.ndarray,
-              of_duty: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        phases, by_number, steep = self._phases(orbit, seen, values, members, of_duty)
+    def _readouts(self, orbit: Orbit, signals: Signals, values: np.ndarray, members: np.ndarray,
+                  of_duty: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        phases, by_number, steep = self._phases(orbit, signals, values, members, of_duty)
         waves = orbit.waves[self._cells]
-        x, y, z = seen.values(phases, waves)
+        x, y, z = signals.values(phases, waves)
         psi, by_phase = basis(self.order, x, y, z)
-        moved = basis_moved(self.order, x, y, seen.derivatives(phases, waves, members))
-        moved += by_phase[..., None] * by_number[:, :, None]
-        return project(psi, np.concatenate([moved, (by_phase * steep[..., None])[..., None]], -1),
+        slope = basis_slope(self.order, x, y, signals.derivatives(phases, waves, members))
+        slope += by_phase[..., None] * by_number[:, :, None]
+        return project(psi, np.concatenate([slope, (by_phase * steep[..., None])[..., None]], -1),
                        self.joints.data, self._rows)
 
     def at_order(self, order: int) -> 'CycleProblem':
         """Return the same problem with readouts of another order."""
         other = copy(self)
-        other.order, other._placed = order, None
+        other.order, other._best = order, None
         return other
 
     def weighted(self, columns: np.ndarray) -> np.ndarray:
@@ -297,37 +297,37 @@ class CycleProblem:
 
     def __call__(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return residuals over their standard errors, instant by instant, and derivatives."""
-        placed = self.best_readouts(values)
-        both = self.weighted(np.concatenate([placed.residual[..., None], placed.jacobian], -1))
-        return both[:, 0], both[:, 1:]
+        fit = self.best_readouts(values)
+        columns = self.weighted(np.concatenate([fit.residual[..., None], fit.jacobian], -1))
+        return columns[:, 0], columns[:, 1:]
 
     def cost(self, values: np.ndarray) -> float:
         """Return half the sum of squares; raise NoOrbit as ``begin`` does."""
-        left = self(values)[0]
-        return 0.5 * float(left @ left)
+        residual = self(values)[0]
+        return 0.5 * float(residual @ residual)
 
     def first_phase(self, values: np.ndarray) -> float:
         """Return the phase of an even grid whose readouts explain most."""
-        return self.explained(values)[0]
+        return self.explained_share(values)[0]
 
-    def explained(self, values: np.ndarray) -> tuple[float, float]:
+    def explained_share(self, values: np.ndarray) -> tuple[float, float]:
         """Return the phase of an even grid whose readouts explain most, and what they explain.
 
         That is a sum of squares over the squares of the sizes, with the mean of each joint.
         """
-        explained = self.explained_by(values).sum(axis=0)
-        best = int(explained.argmax())
-        return best / explained.size, float(explained[best])
+        shares = self.explained_by(values).sum(axis=0)
+        best = int(shares.argmax())
+        return best / shares.size, float(shares[best])
 
     def explained_by(self, values: np.ndarray) -> np.ndarray:
         """Return what the readout of each joint explains at phases of an even grid.
 
         That is a sum of squares over the square of its size, with its mean; shape (joints, m).
         """
-        orbit, seen = self._solve(values)
-        phases = self._phases(orbit, seen, np.append(values[:-1], 0.0), self._members,
+        orbit, signals = self._solve(values)
+        phases = self._phases(orbit, signals, np.append(values[:-1], 0.0), self._members,
                               self._of_duty)[0]
-        psi = basis(self.order, *seen.values(phases, orbit.waves[self._cells]))[0]
+        psi = basis(self.order, *signals.values(phases, orbit.waves[self._cells]))[0]
         inverse = np.linalg.inv(np.linalg.qr(psi, mode='r'))
         # The basis at all shifts, by the correlation theorem.
         spectra = np.fft.rfft(psi @ inverse, axis=1)[self._rows]
@@ -339,6 +339,6 @@ class CycleProblem:
 
         Close to a cosine any phase does nearly as well, and none is the best one nearby for sure.
         """
-        there = np.append(values[:-1], self.first_phase(values))
-        here_left, there_left = self(values)[0], self(there)[0]
-        return there if there_left @ there_left < here_left @ here_left else values
+        shifted = np.append(values[:-1], self.first_phase(values))
+        residual, other = self(values)[0], self(shifted)[0]
+        return shifted if other @ other < residual @ residual else values

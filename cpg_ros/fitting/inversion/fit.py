@@ -77,7 +77,7 @@ class Estimate:
     high: float
     bounded: bool
 
-    def together(self, other: 'Estimate') -> 'Estimate':
+    def union(self, other: 'Estimate') -> 'Estimate':
         """Return this estimate with an interval that includes another's."""
         return replace(self, low=min(self.low, other.low), high=max(self.high, other.high),
                        bounded=self.bounded and other.bounded)
@@ -93,12 +93,12 @@ def correlation_length(residual: np.ndarray) -> float:
 
     """
     power = np.sum(np.abs(np.fft.rfft(residual, axis=0))**2, axis=1)
-    together = np.fft.irfft(power, len(residual))[:len(residual) // 2 + 1]
-    if together[0] <= 0.0:
+    acf = np.fft.irfft(power, len(residual))[:len(residual) // 2 + 1]
+    if acf[0] <= 0.0:
         return 1.0
-    together /= together[0]
-    end = int(np.argmax(together <= 0.0)) if (together <= 0.0).any() else together.size
-    return float(1.0 + 2.0 * together[1:end].sum())
+    acf /= acf[0]
+    end = int(np.argmax(acf <= 0.0)) if (acf <= 0.0).any() else acf.size
+    return float(1.0 + 2.0 * acf[1:end].sum())
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -149,9 +149,9 @@ def spread(jacobian: np.ndarray, inflation: float) -> Spread:
     size = np.linalg.norm(jacobian, axis=0)
     scale = 1.0 / np.where(size > 0.0, size, 1.0)
     values, rows = np.linalg.svd(jacobian * scale, full_matrices=False)[1:]
-    seen = values > RANK_TOLERANCE * max(values[0], 1e-300)
-    half = rows[seen] / values[seen, None]
-    return Spread(inflation * (half.T @ half) * np.outer(scale, scale), rows[~seen], scale,
+    significant = values > RANK_TOLERANCE * max(values[0], 1e-300)
+    half = rows[significant] / values[significant, None]
+    return Spread(inflation * (half.T @ half) * np.outer(scale, scale), rows[~significant], scale,
                   inflation)
 
 
@@ -191,22 +191,22 @@ def model_error(residual: np.ndarray, jacobian: np.ndarray, by_waveform: np.ndar
 
     """
     size = np.linalg.norm(jacobian, axis=0)
-    scaled = jacobian / np.where(size > 0.0, size, 1.0)
-    absorbed = np.linalg.pinv(scaled, RANK_TOLERANCE) @ by_waveform
-    ways, seen, _ = np.linalg.svd(by_waveform - scaled @ absorbed, full_matrices=False)
-    ways, seen = ways[:, seen > RANK_TOLERANCE * seen[0]], seen[seen > RANK_TOLERANCE * seen[0]]**2
+    columns = jacobian / np.where(size > 0.0, size, 1.0)
+    projection = np.linalg.pinv(columns, RANK_TOLERANCE) @ by_waveform
+    ways, s, _ = np.linalg.svd(by_waveform - columns @ projection, full_matrices=False)
+    ways, s = ways[:, s > RANK_TOLERANCE * s[0]], s[s > RANK_TOLERANCE * s[0]]**2
     excess = float(residual @ residual) - MAX_NOISE_RATIO**2 * noise
-    shown = float(np.sum((residual @ ways)**2))
+    explained = float(np.sum((residual @ ways)**2))
     level = NOISE_VARIANCE_RATIO * noise / residual.size
-    if shown > chdtri(seen.size, SIGNIFICANCE) * level:
+    if explained > chdtri(s.size, SIGNIFICANCE) * level:
         # In the few directions of such errors far less of them shows than in the whole residual.
-        excess = max(excess, shown - seen.size * level)
-    if excess <= 0.0 or not seen.size:
+        excess = max(excess, explained - s.size * level)
+    if excess <= 0.0 or not s.size:
         return ModelError(0.0, np.zeros(size.size), QUANTILE)
-    waveform = float(np.sqrt(excess / seen.sum()))
+    waveform = float(np.sqrt(excess / s.sum()))
     # Errors of a model favour some harmonics: as of one direction fewer than are seen.
-    freedom = float(seen.sum()**2 / np.sum(seen**2)) - 1.0
-    return ModelError(waveform, waveform * np.linalg.norm(absorbed, axis=1)
+    freedom = float(s.sum()**2 / np.sum(s**2)) - 1.0
+    return ModelError(waveform, waveform * np.linalg.norm(projection, axis=1)
                       / np.where(size > 0.0, size, 1.0), float(stdtrit(max(freedom, 1.0), 0.975)))
 
 
@@ -256,25 +256,25 @@ def _end(problem: CycleProblem, values: np.ndarray, uncertainty: Spread, k: int,
 
     """
     limit = problem.free[k].high if half > 0.0 else problem.free[k].low
-    least, target = problem.cost(values), float(values[k]) + half
+    min_cost, target = problem.cost(values), float(values[k]) + half
     inside, outside = (0.0, values), (np.inf, values)
     for _ in range(MAX_STEPS):
         target = limit if half * (target - limit) >= 0.0 else target
         at = inside[1]
         if abs(target - at[k]) <= BOUND_TOLERANCE * abs(half):
             return float(at[k]), False
-        there, cost = _least(problem, uncertainty, k, target, at)
-        rise = float(np.sqrt(max(0.0, 2.0 * (cost - least) / uncertainty.inflation)))
+        end, cost = _minimum(problem, uncertainty, k, target, at)
+        rise = float(np.sqrt(max(0.0, 2.0 * (cost - min_cost) / uncertainty.inflation)))
         if abs(rise - QUANTILE) <= INTERVAL_TOLERANCE * QUANTILE:
-            return float(there[k]), True
+            return float(end[k]), True
         if rise > QUANTILE:
-            outside = rise, there
-        elif target == limit or abs(there[k] - target) > EDGE_THRESHOLD * abs(target - at[k]):
-            return float(there[k]), False
+            outside = rise, end
+        elif target == limit or abs(end[k] - target) > EDGE_THRESHOLD * abs(target - at[k]):
+            return float(end[k]), False
         else:
             further = (QUANTILE - rise) / max(rise - inside[0], 0.1 * (QUANTILE - rise))
-            target = float(there[k] + min(MAX_STEP_GROWTH, 1.05 * further) * (there[k] - at[k]))
-            inside = rise, there
+            target = float(end[k] + min(MAX_STEP_GROWTH, 1.05 * further) * (end[k] - at[k]))
+            inside = rise, end
         if np.isfinite(outside[0]):
             fraction = np.clip((QUANTILE - inside[0]) / (outside[0] - inside[0]), 0.1, 0.9)
             target = float(inside[1][k] + fraction * (outside[1][k] - inside[1][k]))
@@ -282,7 +282,7 @@ def _end(problem: CycleProblem, values: np.ndarray, uncertainty: Spread, k: int,
             else (float(outside[1][k]), True))
 
 
-def _least(problem: CycleProblem, uncertainty: Spread, k: int, target: float, at: np.ndarray
+def _minimum(problem: CycleProblem, uncertainty: Spread, k: int, target: float, at: np.ndarray
            ) -> tuple[np.ndarray, float]:
     """Minimise the cost with number k near a target; return values and cost.
 
@@ -291,44 +291,44 @@ def _least(problem: CycleProblem, uncertainty: Spread, k: int, target: float, at
     row = (np.arange(at.size) == k) / (CONSTRAINT_WIDTH * INTERVAL_TOLERANCE * abs(target - at[k]))
 
     def evaluate(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        left, slopes = problem(values)
-        return np.append(left, row @ values - row[k] * target), np.vstack([slopes, row])
+        residual, slopes = problem(values)
+        return np.append(residual, row @ values - row[k] * target), np.vstack([slopes, row])
 
     try:
-        begin = problem.rephased(problem.coordinates.moved(
+        begin = problem.rephased(problem.coordinates.move(
             at, (target - at[k]) * uncertainty.covariance[:, k] / uncertainty.covariance[k, k]))
-        left, slopes = problem(begin)
+        residual, slopes = problem(begin)
         others = np.delete(slopes * uncertainty.scale, k, axis=1)
-        rest = left - others @ np.linalg.lstsq(others, left, RANK_TOLERANCE)[0]
-        cost, least = 0.5 * float(left @ left), 0.5 * float(rest @ rest)
+        rest = residual - others @ np.linalg.lstsq(others, residual, RANK_TOLERANCE)[0]
+        cost, rest_cost = 0.5 * float(residual @ residual), 0.5 * float(rest @ rest)
         # Where a linear step of the others gains little, none is taken.
-        if cost - least < INTERVAL_TOLERANCE * uncertainty.inflation:
-            return begin, least
+        if cost - rest_cost < INTERVAL_TOLERANCE * uncertainty.inflation:
+            return begin, rest_cost
     except NoOrbit:
         begin = at
-    there = problem.coordinates.descend(evaluate, begin, PROFILE_TOLERANCE, MAX_EVALUATIONS).values
-    return there, problem.cost(there)
+    point = problem.coordinates.descend(evaluate, begin, PROFILE_TOLERANCE, MAX_EVALUATIONS).values
+    return point, problem.cost(point)
 
 
 #: MIN_JOINT_RANGE: of a mean cycle, rad; a joint that moves by less stands.
 MIN_JOINT_RANGE = 0.01
 
 
-def rms_shares(recorded: np.ndarray, errors: np.ndarray) -> np.ndarray:
+def rms_shares(data: np.ndarray, errors: np.ndarray) -> np.ndarray:
     """Return RMS error over range of each joint, nan for one that stands, shape (joints,).
 
     Args:
-        recorded: rad, shape (joints, m).
+        data: rad, shape (joints, m).
         errors: fitted minus recorded, rad, the same.
 
     """
-    spans = np.ptp(recorded, axis=1)
+    spans = np.ptp(data, axis=1)
     return np.sqrt(np.mean(errors**2, axis=1)) / np.where(spans > MIN_JOINT_RANGE, spans, np.nan)
 
 
-def mean_share(recorded: np.ndarray, errors: np.ndarray) -> float:
+def mean_share(data: np.ndarray, errors: np.ndarray) -> float:
     """Return the mean of the same over the joints that move; 0 if none does."""
-    shares = rms_shares(recorded, errors)
+    shares = rms_shares(data, errors)
     return float(np.nansum(shares) / max(np.isfinite(shares).sum(), 1))
 
 

@@ -52,7 +52,7 @@ def basis(order: int, x: np.ndarray, y: np.ndarray, z: np.ndarray
             np.stack([np.zeros_like(x), *by_phase[:count]], axis=-1))
 
 
-def basis_moved(order: int, x: np.ndarray, y: np.ndarray, slopes: np.ndarray) -> np.ndarray:
+def basis_slope(order: int, x: np.ndarray, y: np.ndarray, slopes: np.ndarray) -> np.ndarray:
     """Return the derivatives of 1 and the monomials, shape (..., 1 + weights, numbers).
 
     Args:
@@ -70,13 +70,13 @@ def basis_moved(order: int, x: np.ndarray, y: np.ndarray, slopes: np.ndarray) ->
             + by_y[..., :count, None] * slopes[1][..., None, :])
 
 
-def project(psi: np.ndarray, moved: np.ndarray, data: np.ndarray, rows: np.ndarray
+def project(psi: np.ndarray, derivative: np.ndarray, data: np.ndarray, rows: np.ndarray
             ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Fit linear readouts of bases to joints, and differentiate the residual.
 
     Args:
         psi: bases, shape (bases, m, n).
-        moved: their derivatives, shape (bases, m, n, variables).
+        derivative: their derivatives, shape (bases, m, n, variables).
         data: of the joints, shape (m, joints).
         rows: number of each joint's basis, shape (joints,).
 
@@ -89,16 +89,16 @@ def project(psi: np.ndarray, moved: np.ndarray, data: np.ndarray, rows: np.ndarr
 
     """
     q, r = np.linalg.qr(psi)
-    q, inverse, moved = q[rows], np.linalg.inv(r)[rows], moved[rows]
-    turned = q.transpose(0, 2, 1)
-    weights = inverse @ (turned @ data.T[..., None])
-    left = psi[rows] @ weights - data.T[..., None]
-    along = (moved.swapaxes(2, 3) @ weights[:, None])[..., 0]
-    along -= q @ (turned @ along)
-    pulled = (moved.transpose(0, 2, 3, 1) @ left[:, None])[..., 0]
+    q, inverse, derivative = q[rows], np.linalg.inv(r)[rows], derivative[rows]
+    transposed = q.transpose(0, 2, 1)
+    weights = inverse @ (transposed @ data.T[..., None])
+    residual = psi[rows] @ weights - data.T[..., None]
+    along = (derivative.swapaxes(2, 3) @ weights[:, None])[..., 0]
+    along -= q @ (transposed @ along)
+    pull = (derivative.transpose(0, 2, 3, 1) @ residual[:, None])[..., 0]
     # The second part vanishes with the residual: it is what Kaufman (1975) leaves out.
-    along -= q @ (inverse.transpose(0, 2, 1) @ pulled)
-    return weights[..., 0].T, left[..., 0].T, along.swapaxes(0, 1)
+    along -= q @ (inverse.transpose(0, 2, 1) @ pull)
+    return weights[..., 0].T, residual[..., 0].T, along.swapaxes(0, 1)
 
 
 # The signals of a gait that drive joints, as harmonics, and their derivatives by parameters.
@@ -171,12 +171,12 @@ def signals(orbit: Orbit, harmonics: int) -> Signals:
         harmonics: of a Morris-Lecar cell's waveform that joints follow.
 
     """
-    waveform_of = _whole if orbit.network.readout == 'waveform' else _smooth
+    waveform_of = _full_cycle if orbit.network.readout == 'waveform' else _smooth
     waves = [waveform_of(orbit, wave, harmonics) for wave in range(int(orbit.waves.max()) + 1)]
     return Signals(*(np.array(parts) for parts in zip(*waves, strict=True)))
 
 
-def _whole(orbit: Orbit, wave: int, harmonics: int) -> tuple[np.ndarray, np.ndarray]:
+def _full_cycle(orbit: Orbit, wave: int, harmonics: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the terms of a waveform over the peak of cell 1 at phase 0, and their slopes."""
     theta = np.arange(orbit.samples) / orbit.samples
     terms = np.fft.rfft(orbit.waveform(theta, 0, wave)) / theta.size
@@ -221,7 +221,7 @@ class Joints(ShortRepr):
         theta: cycles, shape (m,).
         data: rad, shape (m, joints).
         cells: the cell behind each joint, from 0, shape (joints,).
-        stated: standard error of each joint's mean, over the whole cycle, rad, shape (joints,).
+        errors: standard error of each joint's mean, over the whole cycle, rad, shape (joints,).
 
     """
 
@@ -229,7 +229,7 @@ class Joints(ShortRepr):
     theta: np.ndarray
     data: np.ndarray
     cells: np.ndarray
-    stated: np.ndarray
+    errors: np.ndarray
 
 
 def cells_of(source: Robot | Mapping[str, Sequence[str]], network: type[Network],
@@ -277,29 +277,29 @@ def joints_of(cycle: Stride, cells: Mapping[str, int], network: Network
     names = list(cells)
     theta = np.asarray(cycle.theta, dtype=float)
     mean, error = (np.asarray(array, dtype=float) for array in (cycle.mean, cycle.error))
-    recorded = list(cycle.joints)
-    if mean.shape != (len(recorded), theta.size) or error.shape != mean.shape:
+    all_joints = list(cycle.joints)
+    if mean.shape != (len(all_joints), theta.size) or error.shape != mean.shape:
         raise ValueError(f'mean has the shape {mean.shape} and error {error.shape}; '
-                         f'{len(recorded)} joints on {theta.size} instants need '
-                         f'({len(recorded)}, {theta.size})')
+                         f'{len(all_joints)} joints on {theta.size} instants need '
+                         f'({len(all_joints)}, {theta.size})')
     if not names:
         raise InputError('no joint is assigned to a cell')
     if theta.size < 1 or np.abs((theta - theta[0]) - np.arange(theta.size) / theta.size
                                 ).max() > 1e-9:
         raise ValueError('theta must be an even grid over one cycle')
     for name in names:
-        if name not in recorded:
+        if name not in all_joints:
             raise InputError(f"joint '{name}' is not in the recording")
         if not 1 <= cells[name] <= network.cells:
             raise InputError(f"joint '{name}' has the cell {cells[name]}; there are "
                              f'{network.cells}')
-        row = recorded.index(name)
+        row = all_joints.index(name)
         if not (np.isfinite(mean[row]).all() and np.isfinite(error[row]).all()
                 and (error[row] >= 0.0).all()):
             raise InputError(f"joint '{name}' has a mean or error that is not finite")
-    rows = [recorded.index(name) for name in names]
-    stated = np.sqrt(np.mean(error[rows]**2, axis=1))
+    rows = [all_joints.index(name) for name in names]
+    errors = np.sqrt(np.mean(error[rows]**2, axis=1))
     spans = np.ptp(mean[rows], axis=1)
     floor = MIN_RELATIVE_ERROR * np.where(spans > 0.0, spans, max(float(spans.max()), 1e-12))
     return Joints(tuple(names), theta, mean[rows].T.copy(),
-                  np.array([cells[name] - 1 for name in names]), np.maximum(stated, floor))
+                  np.array([cells[name] - 1 for name in names]), np.maximum(errors, floor))

@@ -97,8 +97,8 @@ def stride_curves(result: RecordingFit) -> Figure:
     figure, grid = _grid(max(1, len(panels)), 2.2)
     legs = list(result.stride.phases)
     percent = np.linspace(0.0, 100.0, len(result.stride.theta) + 1)
-    for axes, (role, own) in zip(grid, panels.items(), strict=False):
-        for leg, *rows in own:
+    for axes, (role, curves_of_role) in zip(grid, panels.items(), strict=False):
+        for leg, *rows in curves_of_role:
             # The end of the stride is its begin.
             mean, spread = (np.append(row, row[0]) for row in rows)
             color = LEG_COLORS[legs.index(leg) % len(LEG_COLORS)]
@@ -124,7 +124,7 @@ def phases(result: RecordingFit) -> Figure:
     axes = figure.subplots()
     orbit = result.fit.orbit
     cells = next(iter(orbit.network.legs.values()))
-    network_phases = {leg: float(orbit.phases[own[0] - 1]) for leg, own in cells.items()}
+    network_phases = {leg: float(orbit.phases[ids[0] - 1]) for leg, ids in cells.items()}
     for row, (leg, phase) in enumerate(result.stride.phases.items()):
         height = len(result.stride.phases) - 1 - row
         marks: list[tuple[float | None, dict[str, Any]]] = [
@@ -163,8 +163,8 @@ def stretch(result: RecordingFit) -> Figure:
     edges = np.linspace(0, len(angles), min(MAX_PIXELS, len(angles)) + 1).astype(int)[:-1]
     low, high = (extreme.reduceat(np.where(np.isnan(angles), none, angles), edges)
                  for extreme, none in ((np.minimum, np.inf), (np.maximum, -np.inf)))
-    there = low <= high
-    axes.fill_between(recording.times[edges][there], low[there], high[there], color=_text(),
+    inside = low <= high
+    axes.fill_between(recording.times[edges][inside], low[inside], high[inside], color=_text(),
                       linewidth=0.6)
     axes.axvspan(stride.begin, stride.end, color=FIT_COLOR, alpha=0.15, linewidth=0.0)
     axes.set_title(f'{name}; shaded: the steady stretch, {stride.begin:.2f} to {stride.end:.2f} s '
@@ -227,7 +227,7 @@ def starts(result: RecordingFit) -> list[tuple[str, ...]]:
         begin, end = (', '.join(f'{name} {value:.4f}' for name, value
                                 in zip(names, values, strict=False))
                       for values in (trial.start, trial.values))
-        rows.append((begin, str(trial.iterations), f'{trial.cost:.6g}', trial.why or end))
+        rows.append((begin, str(trial.iterations), f'{trial.cost:.6g}', trial.reason or end))
     return rows
 
 
@@ -307,7 +307,7 @@ def _image(figure: Figure, name: str) -> str:
     return image(out.getvalue(), name)
 
 
-def _warned(result: RecordingFit) -> str:
+def _warning(result: RecordingFit) -> str:
     """Return the warnings, before anything else; red where the fit is poor."""
     if not result.warnings:
         return ''
@@ -337,7 +337,7 @@ def as_html(result: RecordingFit) -> str:
         return '\n'.join(f'<p>{escape(line)}</p>' for line in lines)
 
     title = f'{result.fit.gait} at {result.stride.frequency:.3f} Hz: {result.recording.source}'
-    parts = [_warned(result), paragraphs(_stride(result)), *_strides(result),
+    parts = [_warning(result), paragraphs(_stride(result)), *_strides(result),
              '<h2>Parameters</h2>',
              _html_table(parameters(result)), paragraphs(_stability(result)), '<h2>Joints</h2>',
              paragraphs([_order_errors(result)]), _html_table(joints(result))]

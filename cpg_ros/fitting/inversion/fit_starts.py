@@ -40,7 +40,7 @@ RANGE_FRACTIONS, MAX_RANGE_RATIO = (np.arange(9) + 0.5) / 9, 10.0
 MIN_STARTS, MAX_STARTS = 2, 3
 
 
-def _tried(problem: CycleProblem, k: int, parameter: Free, here: float) -> tuple[float, ...]:
+def _grid(problem: CycleProblem, k: int, parameter: Free, base: float) -> tuple[float, ...]:
     """Return the candidate coordinates of a free number besides its own."""
     if parameter.name == GAIT_DUTY:
         return DUTIES
@@ -49,7 +49,7 @@ def _tried(problem: CycleProblem, k: int, parameter: Free, here: float) -> tuple
     low, high = parameter.low, parameter.high
     if 0.0 < low < high <= MAX_RANGE_RATIO * low:
         return tuple(low + fraction * (high - low) for fraction in RANGE_FRACTIONS)
-    return tuple(factor * here for factor in FACTORS)
+    return tuple(factor * base for factor in FACTORS)
 
 
 def best_starts(problem: CycleProblem, begin: np.ndarray) -> list[np.ndarray]:
@@ -65,26 +65,26 @@ def best_starts(problem: CycleProblem, begin: np.ndarray) -> list[np.ndarray]:
     """
     try:
         problem.begin(begin)
-        here = problem.coordinates.of(begin)[:-1]
+        base = problem.coordinates.of(begin)[:-1]
     except NoOrbit:
         return [begin]
-    axes = [np.unique([value, *_tried(problem, k, parameter, float(value))])
-            for k, (parameter, value) in enumerate(zip(problem.free, here, strict=True))]
+    axes = [np.unique([value, *_grid(problem, k, parameter, float(value))])
+            for k, (parameter, value) in enumerate(zip(problem.free, base, strict=True))]
     grid = np.stack(np.meshgrid(*axes, indexing='ij'), axis=-1)
     explained, starts = np.full(grid.shape[:-1], -np.inf), {}
-    own = [int(np.abs(axis - value).argmin()) for axis, value in zip(axes, here, strict=True)]
+    start = [int(np.abs(axis - value).argmin()) for axis, value in zip(axes, base, strict=True)]
     # The nearest ones first, an orbit leads to the next; one of the network's numbers is moved at
     # a time, as an orbit takes far longer than a readout.
-    far = np.sum(np.abs(grid - here) / (np.abs(here) + MIN_SCALE), axis=-1)
-    for index in sorted(np.ndindex(far.shape), key=lambda parameter: float(far[parameter])):
-        if sum(k != at for k, at, parameter in zip(index, own, problem.free, strict=True)
+    norm = np.sum(np.abs(grid - base) / (np.abs(base) + MIN_SCALE), axis=-1)
+    for index in sorted(np.ndindex(norm.shape), key=lambda parameter: float(norm[parameter])):
+        if sum(k != at for k, at, parameter in zip(index, start, problem.free, strict=True)
                if parameter.members) > 1:
             continue
         with suppress(NoOrbit):
             values = problem.coordinates.values(np.append(grid[index], 0.0))
             if all(parameter.low <= value <= parameter.high
                    for parameter, value in zip(problem.free, values, strict=False)):
-                values[-1], explained[index] = problem.explained(values)
+                values[-1], explained[index] = problem.explained_share(values)
                 problem.hold(values)
                 starts[index] = values
     if not starts:
@@ -92,7 +92,7 @@ def best_starts(problem: CycleProblem, begin: np.ndarray) -> list[np.ndarray]:
     ranked = sorted(starts, key=lambda index: -explained[index])
     best = [index for index in ranked if _highest(explained, index)][:MAX_STARTS]
     best += [index for index in ranked if index not in best][:max(MIN_STARTS - len(best), 0)]
-    return [starts[index] for index in ranked if index in (tuple(own), *best)]
+    return [starts[index] for index in ranked if index in (tuple(start), *best)]
 
 
 def upside_down(problem: CycleProblem, values: np.ndarray) -> np.ndarray | None:
@@ -104,14 +104,14 @@ def upside_down(problem: CycleProblem, values: np.ndarray) -> np.ndarray | None:
     fractions = [k for k, parameter in enumerate(problem.free) if parameter.name in DUTY_NAMES]
     if not fractions:
         return None
-    there = values.copy()
+    shifted = values.copy()
     for k in fractions:
-        there[k] = np.clip(1.0 - values[k], problem.free[k].low, problem.free[k].high)
-    there[-1] = problem.explained(there)[0]
-    return there
+        shifted[k] = np.clip(1.0 - values[k], problem.free[k].low, problem.free[k].high)
+    shifted[-1] = problem.explained_share(shifted)[0]
+    return shifted
 
 
 def _highest(explained: np.ndarray, index: tuple[int, ...]) -> bool:
     """Return whether no neighbour on the grid explains more."""
-    near = explained[tuple(slice(max(k - 1, 0), k + 2) for k in index)]
-    return bool(explained[index] >= near.max())
+    neighbours = explained[tuple(slice(max(k - 1, 0), k + 2) for k in index)]
+    return bool(explained[index] >= neighbours.max())

@@ -94,9 +94,9 @@ def free_numbers(network: Network, gait: str, names: Sequence[str],
         members = network.groups.get(name, (name,))
         members = tuple(dict.fromkeys(
             member for family in families if set(family) & set(members) for member in family))
-        taken = [other.name for other in free if set(other.members) & set(members)]
-        if taken:
-            raise InputError(f'{name} is the same as {taken[0]}, which is free already')
+        others = [other.name for other in free if set(other.members) & set(members)]
+        if others:
+            raise InputError(f'{name} is the same as {others[0]}, which is free already')
         low = max(network.ranges[member].low for member in members)
         high = min(network.ranges[member].high for member in members)
         if name in bounds:
@@ -134,7 +134,7 @@ class Minimisation(ShortRepr):
             + values).
         evaluations: number of orbits solved for.
         converged: whether a tolerance was met.
-        why: why the start has no orbit, or ''.
+        reason: why the start has no orbit, or ''.
 
     """
 
@@ -144,7 +144,7 @@ class Minimisation(ShortRepr):
     path: np.ndarray
     evaluations: int
     converged: bool
-    why: str = ''
+    reason: str = ''
 
     @classmethod
     def without_orbit(cls, start: np.ndarray, error: NoOrbit) -> 'Minimisation':
@@ -185,8 +185,8 @@ def minimise(evaluate: Evaluate, start: np.ndarray, low: np.ndarray, high: np.nd
             return np.full(size, np.nan)
 
     def jacobian(values: np.ndarray) -> np.ndarray:
-        left, slopes = evaluate(values)
-        path.append(np.append(0.5 * left @ left, values))
+        rest, slopes = evaluate(values)
+        path.append(np.append(0.5 * rest @ rest, values))
         return slopes
 
     result = least_squares(residual, start, jacobian, (low, high), 'trf', x_scale='jac',
@@ -213,10 +213,10 @@ class Coordinates:
 
     def __init__(self, network: Network, gait: str, free: Sequence[Free]) -> None:
         self._network, self._gait, self.free = network, gait, tuple(free)
-        whole = network.ranges.get(network.delay_parameter)
-        self.delay = next((k for k, parameter in enumerate(free) if whole
+        delay = network.ranges.get(network.delay_parameter)
+        self.delay = next((k for k, parameter in enumerate(free) if delay
                             and parameter.name == network.delay_parameter
-                            and (parameter.low, parameter.high) == (whole.low, whole.high)), -1)
+                            and (parameter.low, parameter.high) == (delay.low, delay.high)), -1)
 
     @property
     def straight(self) -> bool:
@@ -224,11 +224,11 @@ class Coordinates:
         return self.delay < 0
 
     def _onset(self, values: np.ndarray) -> HopfPoint:
-        there = with_values(self._network, self.free, values[:len(self.free)])
-        point = first_hopf(there, self._gait) if np.isfinite(values).all() else None
+        network = with_values(self._network, self.free, values[:len(self.free)])
+        point = first_hopf(network, self._gait) if np.isfinite(values).all() else None
         if point is None:
-            start = there.as_dict()
-            values_text = ', '.join(f'{name} {start[name]:g}' for name in there.needed)
+            start = network.as_dict()
+            values_text = ', '.join(f'{name} {start[name]:g}' for name in network.needed)
             raise NoOrbit(f'{values_text} gives no {self._gait} at any delay')
         return point
 
@@ -261,7 +261,7 @@ class Coordinates:
             matrix[k, k] = point.value
         return matrix
 
-    def moved(self, values: np.ndarray, step: np.ndarray) -> np.ndarray:
+    def move(self, values: np.ndarray, step: np.ndarray) -> np.ndarray:
         """Move values by a step in the coordinates, within the bounds."""
         if self.straight:
             low, high = self.bounds(values)
@@ -294,14 +294,14 @@ class Coordinates:
             most: largest number of evaluations.
 
         """
-        def moved(coordinates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            left, slopes = evaluate(self.values(coordinates))
-            return left, slopes if self.straight else slopes @ self.slopes(coordinates)
+        def in_coordinates(coordinates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            residual, slopes = evaluate(self.values(coordinates))
+            return residual, slopes if self.straight else slopes @ self.slopes(coordinates)
 
         low, high = self.bounds(start)
         begin = np.clip(self.of(start), low, high)
-        trial = minimise(moved, begin, low, high, tolerance, most)
-        if self.straight or trial.why:
+        trial = minimise(in_coordinates, begin, low, high, tolerance, most)
+        if self.straight or trial.reason:
             return replace(trial, start=start)
         path = np.array([[row[0], *self.values(row[1:])] for row in trial.path])
         return replace(trial, start=start, values=self.values(trial.values), path=path)

@@ -78,8 +78,8 @@ def phase_change(recording: Recording, legs: Mapping[str, Sequence[str]], stride
     after = (sums[-1] - sums[ends[:, 0] - 1]) / (count - ends)
     ratio = ends * (count - ends) / count * np.abs(after - before)**2
     best = int(np.argmax(ratio.sum(axis=1)))
-    turned = np.angle(after[best] * before[best].conj()) / (2.0 * np.pi)
-    if np.abs(turned).max() <= PHASE_CHANGE_THRESHOLD:
+    shift = np.angle(after[best] * before[best].conj()) / (2.0 * np.pi)
+    if np.abs(shift).max() <= PHASE_CHANGE_THRESHOLD:
         return None
     first = np.ceil(stride.warp.phases[0])
     return float(np.interp(first + ends[best, 0], stride.warp.phases, stride.warp.knots))
@@ -93,16 +93,16 @@ def _points(recording: Recording, legs: Mapping[str, Sequence[str]], stride: Str
     phases = warp(recording.times[inside])
     first, last = int(np.ceil(phases[0])), int(np.floor(phases[-1]))
     number = np.floor(phases).astype(int) - first
-    whole = (number >= 0) & (number < last - first)
-    phasor = np.exp(-2j * np.pi * phases[whole])
+    complete = (number >= 0) & (number < last - first)
+    phasor = np.exp(-2j * np.pi * phases[complete])
     sums = []
     for leg in stride.phases:
         name = max((joint for joint in legs[leg] if joint in stride.joints),
                    key=lambda joint: float(np.ptp(stride.mean[stride.joints.index(joint)])))
-        x = recording.positions[inside, joints.index(name)][whole]
+        x = recording.positions[inside, joints.index(name)][complete]
         x = np.where(np.isfinite(x), x - np.nanmean(x), 0.0) * phasor
-        sums.append(np.bincount(number[whole], x.real, last - first)
-                    + 1j * np.bincount(number[whole], x.imag, last - first))
+        sums.append(np.bincount(number[complete], x.real, last - first)
+                    + 1j * np.bincount(number[complete], x.imag, last - first))
     ahead = np.array(sums[1:]) * np.conj(sums[0])
     return (ahead / np.maximum(np.abs(ahead), 1e-300)).T
 
@@ -165,7 +165,7 @@ def cut(recording: Recording, robot: Robot | None = None, network: str = ''
     kind = network_for(network, legs, robot)
     strides: list[tuple[float, float, Stride]] = []
     remains = [(0.0, float(recording.times[-1]))]
-    why: NoSteadyGait | None = None
+    reason: NoSteadyGait | None = None
     longest: Stride | None = None
     while remains:
         begin, end = remains.pop()
@@ -173,7 +173,7 @@ def cut(recording: Recording, robot: Robot | None = None, network: str = ''
             part = recording.between(begin, end)
             _, stride = stride_of(part, legs, kind, robot)
         except NoSteadyGait as error:
-            why = why or error
+            reason = reason or error
             continue
         except RecordingError:
             # Fewer than two samples are no stretch.
@@ -191,8 +191,8 @@ def cut(recording: Recording, robot: Robot | None = None, network: str = ''
             strides.append((first, last, stride))
         remains += _longer((begin, first), (last, end))
     if not strides:
-        raise why or NoSteadyGait(f'{recording.source}: no steady gait of {RELIABLE_CYCLES:g} '
-                                  'strides' + (
+        raise reason or NoSteadyGait(f'{recording.source}: no steady gait of {RELIABLE_CYCLES:g} '
+                                     'strides' + (
                                       f', only of {longest.cycles}, of '
                                       f'{1.0 / longest.frequency:.3g} s each: record '
                                       f'{RELIABLE_CYCLES / longest.frequency:.2g} s or more'
@@ -320,20 +320,20 @@ def robot_of(stretches: Sequence[StretchFit], robot: Robot | None) -> Robot:
     for stretch in sorted(stretches, key=lambda stretch: stretch.begin - stretch.end):
         if stretch.fit is not None:
             longest.setdefault(stretch.fit.fit.gait, stretch.fit)
-    made = [fitted_robot(fit, robot) for fit in longest.values()]
+    robots = [fitted_robot(fit, robot) for fit in longest.values()]
     # Without a robot file each stretch gives limits of its own.
-    bounds = {joint.name: joint for joint in made[0].joints}
-    for joint in itertools.chain.from_iterable(other.joints for other in made[1:]):
+    bounds = {joint.name: joint for joint in robots[0].joints}
+    for joint in itertools.chain.from_iterable(other.joints for other in robots[1:]):
         bound = bounds[joint.name]
         bounds[joint.name] = replace(bound, lower=min(bound.lower, joint.lower),
                                      upper=max(bound.upper, joint.upper),
                                      velocity=max(bound.velocity, joint.velocity))
-    motions = made[0].motions | {
+    motions = robots[0].motions | {
         gait: fitted_motion(fit, None) if robot is None else stretch.motions[gait]
-        for (gait, fit), stretch in zip(longest.items(), made, strict=True)}
+        for (gait, fit), stretch in zip(longest.items(), robots, strict=True)}
     legs = {leg: tuple(bounds[joint.name] for joint in joints)
-            for leg, joints in made[0].legs.items()}
-    return replace(made[0], legs=legs, motions=motions)
+            for leg, joints in robots[0].legs.items()}
+    return replace(robots[0], legs=legs, motions=motions)
 
 
 def write_schedule(path: Path, stretches: Sequence[StretchFit], robot: Robot | None) -> list[Path]:

@@ -82,9 +82,9 @@ def findings(free: Sequence[Free], estimates: Mapping[str, Estimate], spread: Sp
     if model.size > 0.0:
         bounded = [name for name, estimate in estimates.items() if estimate.bounded]
         unknown = [name for name in estimates if name not in bounded]
-        clauses = [f'the intervals of {_listed(bounded)} allow for this'] if bounded else []
+        clauses = [f'the intervals of {_quote(bounded)} allow for this'] if bounded else []
         if unknown:
-            clauses.append(f'{_listed(unknown)}: cannot tell')
+            clauses.append(f'{_quote(unknown)}: cannot tell')
         lines.append((
             f'the model does not fit the recording: the residual is {times:.3g} times the noise, '
             f'as with waveforms that are wrong by {100.0 * model.size:.2g} %; '
@@ -100,7 +100,7 @@ def findings(free: Sequence[Free], estimates: Mapping[str, Estimate], spread: Sp
             moves = moves / np.abs(moves).max()
             ways = ', '.join(f'{estimate.name} by {move:+.3g}' for estimate, move
                              in zip(free, moves, strict=True) if estimate.name in blind)
-            lines.append(f'{_listed(blind)} are not determined one by one: changing {ways} '
+            lines.append(f'{_quote(blind)} are not determined one by one: changing {ways} '
                          'does not affect the recorded motion')
     for k, (name, estimate) in enumerate(estimates.items()):
         room = BOUND_TOLERANCE * (free[k].high - free[k].low)
@@ -129,7 +129,7 @@ def findings(free: Sequence[Free], estimates: Mapping[str, Estimate], spread: Sp
     return lines
 
 
-def _listed(names: Sequence[str]) -> str:
+def _quote(names: Sequence[str]) -> str:
     return ' and '.join(filter(None, [', '.join(names[:-1]), names[-1]]))
 
 
@@ -191,10 +191,10 @@ def invert(cycle: Stride, cells: Mapping[str, int], network: Network, gait: str,
     problem.loaded = loaded
     trials = _trials(problem, starts, done)
     best = min(trials, key=lambda trial: trial.cost)
-    values = _weighed(problem, best.values)
+    values = _reweight(problem, best.values)
     problem.hold(values)
-    values, others, turned = _preferred(problem, values, trials)
-    runs, reason = _that_runs(problem, [values, *others], best.path[:, 1:])
+    values, others, turned = _select_minimum(problem, values, trials)
+    runs, reason = _stable_values(problem, [values, *others], best.path[:, 1:])
     warnings = [] if problem.readout.weights else [
         'without a robot file, the recording does not tell stance from swing: ' + ', '.join(
             f'{free.name} {value:.4g}' for free,
@@ -216,11 +216,11 @@ def _problem(cycle: Stride, joints: Joints, network: Network, gait: str,
     """Check the arguments, which are those of ``invert``, and return the problem."""
     if order not in NUM_WEIGHTS:
         raise ValueError(f'order {order} is not 1, 2 or 3')
-    taken = len(joints.names) * (1 + NUM_WEIGHTS[order]) + len(numbers) + 1
-    if joints.theta.size < 2 * (1 + NUM_WEIGHTS[order]) or joints.data.size <= taken:
+    count = len(joints.names) * (1 + NUM_WEIGHTS[order]) + len(numbers) + 1
+    if joints.theta.size < 2 * (1 + NUM_WEIGHTS[order]) or joints.data.size <= count:
         raise InputError(f'{joints.theta.size} instants of {len(joints.names)} joints do not '
                          f'determine readouts of order {order} and {len(numbers)} parameters')
-    return CycleProblem(joints, joints.stated, network, gait, numbers, order, readout, orbits)
+    return CycleProblem(joints, joints.errors, network, gait, numbers, order, readout, orbits)
 
 
 def _trials(problem: CycleProblem, starts: Sequence[Mapping[str, float]],
@@ -232,23 +232,23 @@ def _trials(problem: CycleProblem, starts: Sequence[Mapping[str, float]],
     trials: list[Minimisation] = []
     for begin in begins:
         done(0.5 * len(trials) / len(begins))
-        trials.append(_trial(problem, begin, weigh=all(other.why for other in trials)))
+        trials.append(_trial(problem, begin, weigh=all(other.reason for other in trials)))
     best = min(trials, key=lambda trial: trial.cost)
-    if best.why:
-        raise NoOrbit(trials[0].why)
+    if best.reason:
+        raise NoOrbit(trials[0].reason)
     with suppress(NoOrbit):
         if not starts and (other := upside_down(problem, best.values)) is not None:
             trials.append(_trial(problem, other, weigh=False))
     done(0.5)
-    return [_pursued(problem, trial, best.cost) for trial in trials]
+    return [_continue_trial(problem, trial, best.cost) for trial in trials]
 
 
 def _numbers(network: Network, gait: str, names: Sequence[str],
              bounds: Mapping[str, tuple[float, float]] | None) -> tuple[Free, ...]:
     """Return the free numbers, the gait's duty last."""
-    own = [name for name in names if name != GAIT_DUTY]
+    numbers = [name for name in names if name != GAIT_DUTY]
     duty = (Free(GAIT_DUTY, (), MIN_DUTY, MAX_DUTY),) if GAIT_DUTY in names else ()
-    return (free_numbers(network, gait, own, bounds) if own or not duty else ()) + duty
+    return (free_numbers(network, gait, numbers, bounds) if numbers or not duty else ()) + duty
 
 
 def _begin(problem: CycleProblem, start: Mapping[str, float]) -> np.ndarray:
@@ -276,16 +276,16 @@ def _trial(problem: CycleProblem, values: np.ndarray, weigh: bool) -> Minimisati
     except NoOrbit as error:
         return Minimisation.without_orbit(values, error)
     if weigh:
-        problem.sizes = np.maximum(problem.joints.stated, problem.left(values))
+        problem.sizes = np.maximum(problem.joints.errors, problem.residual_rms(values))
     trial = problem.coordinates.descend(problem, values, TOLERANCE, TRIAL_EVALUATIONS)
     problem.hold(trial.values)
     return trial
 
 
-def _pursued(problem: CycleProblem, trial: Minimisation, least: float) -> Minimisation:
+def _continue_trial(problem: CycleProblem, trial: Minimisation, min_cost: float) -> Minimisation:
     """Continue a trial until it converges, unless its cost is far above the least."""
-    if trial.converged or trial.why or (
-            trial.cost > ABANDON_RATIO * least + ABANDON_START_RATIO * trial.path[0, 0]):
+    if trial.converged or trial.reason or (
+            trial.cost > ABANDON_RATIO * min_cost + ABANDON_START_RATIO * trial.path[0, 0]):
         return trial
     rest = problem.coordinates.descend(problem, trial.values, TOLERANCE)
     problem.hold(rest.values)
@@ -293,10 +293,10 @@ def _pursued(problem: CycleProblem, trial: Minimisation, least: float) -> Minimi
                    evaluations=trial.evaluations + rest.evaluations)
 
 
-def _weighed(problem: CycleProblem, values: np.ndarray) -> np.ndarray:
+def _reweight(problem: CycleProblem, values: np.ndarray) -> np.ndarray:
     """Weight the joints by their residuals and fit again, until the weights settle."""
     for last in range(MAX_REWEIGHTINGS):
-        sizes = np.maximum(problem.joints.stated, problem.left(values))
+        sizes = np.maximum(problem.joints.errors, problem.residual_rms(values))
         if last and np.abs(sizes / problem.sizes - 1.0).max() < WEIGHT_TOLERANCE:
             break
         problem.sizes = sizes
@@ -305,13 +305,13 @@ def _weighed(problem: CycleProblem, values: np.ndarray) -> np.ndarray:
     return values
 
 
-def _as_good(problem: CycleProblem, values: np.ndarray) -> float:
+def _margin(problem: CycleProblem, values: np.ndarray) -> float:
     """Return the difference of costs up to which another minimum is as good as values."""
     residual = problem.best_readouts(values).residual / problem.sizes
     return 0.5 * QUANTILE**2 * correlation_length(residual)
 
 
-def _preferred(problem: CycleProblem, values: np.ndarray, trials: Sequence[Minimisation]
+def _select_minimum(problem: CycleProblem, values: np.ndarray, trials: Sequence[Minimisation]
                ) -> tuple[np.ndarray, list[np.ndarray], list[np.ndarray]]:
     """Return the values of the preferred minimum, other minima, and inverted ones.
 
@@ -319,24 +319,24 @@ def _preferred(problem: CycleProblem, values: np.ndarray, trials: Sequence[Minim
     are as good as the best, the one whose joints move as in the robot file is preferred; without
     one, that with the largest duty.
     """
-    def readouts(there: np.ndarray) -> np.ndarray:
-        return problem.best_readouts(there).weights[1:3]
+    def readouts(point: np.ndarray) -> np.ndarray:
+        return problem.best_readouts(point).weights[1:3]
 
-    def meant(there: np.ndarray) -> float:
-        agrees = problem.readout.agreement(problem.joints.names, readouts(there))
-        return agrees or problem.stance_fraction(there)
+    def agreement(point: np.ndarray) -> float:
+        agrees = problem.readout.agreement(problem.joints.names, readouts(point))
+        return agrees or problem.stance_fraction(point)
 
-    candidates, least = [values], problem.cost(values)
+    candidates, min_cost = [values], problem.cost(values)
     for trial in trials:
-        if not trial.why and all(distinct(trial.values[:-1], candidate[:-1])
-                                 for candidate in candidates):
-            there = trial.values
-            if problem.cost(there) <= MAX_COST_RATIO * least:
+        if not trial.reason and all(distinct(trial.values[:-1], candidate[:-1])
+                                    for candidate in candidates):
+            point = trial.values
+            if problem.cost(point) <= MAX_COST_RATIO * min_cost:
                 # Joints were weighted otherwise where it was found.
-                there = problem.coordinates.descend(problem, there, TOLERANCE).values
-                problem.hold(there)
-            candidates.append(there)
-    most = min(problem.cost(candidate) for candidate in candidates) + _as_good(problem, values)
+                point = problem.coordinates.descend(problem, point, TOLERANCE).values
+                problem.hold(point)
+            candidates.append(point)
+    limit = min(problem.cost(candidate) for candidate in candidates) + _margin(problem, values)
 
     def reverse(candidate: np.ndarray) -> bool:
         return float(np.sum(readouts(candidate) * readouts(values))) < 0.0
@@ -346,19 +346,19 @@ def _preferred(problem: CycleProblem, values: np.ndarray, trials: Sequence[Minim
         later = candidate + np.append(np.zeros(candidate.size - 1), 0.5)
         if reverse(candidate) and problem.cost(later) <= problem.cost(candidate) + COST_TOLERANCE:
             candidates[k] = later
-    best = max((candidate for candidate in candidates if problem.cost(candidate) <= most),
-               key=meant)
-    turned = [candidate for candidate in candidates if reverse(candidate)]
-    if best is not values and (any(candidate is best for candidate in turned)
-                               or problem.cost(values) > most):
-        turned, values = [values], _weighed(problem, best)
+    best = max((candidate for candidate in candidates if problem.cost(candidate) <= limit),
+               key=agreement)
+    inverse = [candidate for candidate in candidates if reverse(candidate)]
+    if best is not values and (any(candidate is best for candidate in inverse)
+                               or problem.cost(values) > limit):
+        inverse, values = [values], _reweight(problem, best)
         problem.hold(values)
     others = [candidate for candidate in candidates if distinct(candidate[:-1], values[:-1])
               and not reverse(candidate)]
-    return values, others, [candidate for candidate in turned if problem.cost(candidate) <= most]
+    return values, others, [candidate for candidate in inverse if problem.cost(candidate) <= limit]
 
 
-def _that_runs(problem: CycleProblem, by_cost: Sequence[np.ndarray], way: np.ndarray
+def _stable_values(problem: CycleProblem, by_cost: Sequence[np.ndarray], way: np.ndarray
                ) -> tuple[np.ndarray | None, str]:
     """Return the best values that the generator runs, and why it rejects the best ones, or ''.
 
@@ -385,33 +385,33 @@ def _that_runs(problem: CycleProblem, by_cost: Sequence[np.ndarray], way: np.nda
         if not reason_at(values):
             return values, first
     trail = [*way, by_cost[0]]
-    runs, refused = 0, len(trail) - 1
+    runs, rejected = 0, len(trail) - 1
     if reason_at(trail[0]):
         return None, first
-    while refused - runs > 1:
-        middle = (runs + refused) // 2
-        runs, refused = (runs, middle) if reason_at(trail[middle]) else (middle, refused)
-    here, beyond = trail[runs], trail[refused]
+    while rejected - runs > 1:
+        middle = (runs + rejected) // 2
+        runs, rejected = (runs, middle) if reason_at(trail[middle]) else (middle, rejected)
+    inside, outside = trail[runs], trail[rejected]
     for _ in range(BISECTION_STEPS):
-        between = 0.5 * (here + beyond)
-        here, beyond = (here, between) if reason_at(between) else (between, beyond)
-    here = problem.rephased(here)
-    problem.hold(here)
-    return here, first
+        between = 0.5 * (inside + outside)
+        inside, outside = (inside, between) if reason_at(between) else (between, outside)
+    inside = problem.rephased(inside)
+    problem.hold(inside)
+    return inside, first
 
 
 def _estimates(problem: CycleProblem, values: np.ndarray, straight: bool
                ) -> tuple[dict[str, Estimate], Spread, ModelError]:
     """Return the estimates at values, their covariance, and the errors of the model."""
-    left, slopes = problem(values)
+    residual, slopes = problem(values)
     uncertainty = spread(slopes, correlation_length(
         problem.best_readouts(values).residual / problem.sizes))
     model = ModelError.unknown(values.size) if problem.loaded else model_error(
-        left, slopes, problem.weighted(problem.by_waveform(values)), problem.noise)
+        residual, slopes, problem.weighted(problem.by_waveform(values)), problem.noise)
     return estimates(problem, values, uncertainty, model, straight), uncertainty, model
 
 
-def _if_joints_lag(problem: CycleProblem, values: np.ndarray, estimated: Mapping[str, Estimate],
+def _lag_warnings(problem: CycleProblem, values: np.ndarray, estimated: Mapping[str, Estimate],
                    uncertainty: Spread) -> list[str]:
     """Warn of values beyond the intervals that fit as well if joints lag their cells.
 
@@ -419,14 +419,14 @@ def _if_joints_lag(problem: CycleProblem, values: np.ndarray, estimated: Mapping
     """
     if not problem.kinds.any():
         return []
-    left = problem(values)[0]
+    residual = problem(values)[0]
     data = problem.joints.data / problem.sizes
-    enough = float(np.sum(data * data) - left @ left) - 2.0 * _as_good(problem, values)
+    threshold = float(np.sum(data * data) - residual @ residual) - 2.0 * _margin(problem, values)
 
-    def fits(there: np.ndarray) -> bool:
-        by_joint = problem.explained_by(there)
+    def fits(point: np.ndarray) -> bool:
+        by_joint = problem.explained_by(point)
         return sum(by_joint[problem.kinds == kind].sum(axis=0).max()
-                   for kind in range(problem.kinds.max() + 1)) >= enough
+                   for kind in range(problem.kinds.max() + 1)) >= threshold
 
     lines = []
     for k, (name, one) in enumerate(estimated.items()):
@@ -435,14 +435,14 @@ def _if_joints_lag(problem: CycleProblem, values: np.ndarray, estimated: Mapping
             beyond = False
             with suppress(NoOrbit):
                 for times in LAG_TEST_RATIOS if one.bounded else ():
-                    there = problem.coordinates.moved(
+                    point = problem.coordinates.move(
                         values, times * half * uncertainty.covariance[:, k]
                         / uncertainty.covariance[k, k])
-                    good = fits(there)
+                    fits_well = fits(point)
                     # The end lies before the first value that fits worse.
-                    if good or beyond:
-                        ends[side] = float(there[k])
-                    if not good:
+                    if fits_well or beyond:
+                        ends[side] = float(point[k])
+                    if not fits_well:
                         break
                     beyond = True
         if ends != [one.low, one.high]:
@@ -456,34 +456,34 @@ def _fit_at(problem: CycleProblem, trials: Sequence[Minimisation], others: Seque
             values: np.ndarray, straight: bool, warnings: Sequence[str]) -> Fit:
     """Return the fit at values, with its intervals and warnings."""
     joints, best = problem.joints, min(trials, key=lambda trial: trial.cost)
-    placed = problem.best_readouts(values)
-    estimated, spread, model = _estimates(problem, values, straight)
+    readout_fit = problem.best_readouts(values)
+    estimate, spread, model = _estimates(problem, values, straight)
     for other in others:
-        if problem.cost(other) < problem.cost(values) + _as_good(problem, values):
+        if problem.cost(other) < problem.cost(values) + _margin(problem, values):
             # Another minimum explains the recording as well: the intervals hold both.
-            estimated = {name: parameter.together(_estimates(problem, other, straight)[0][name])
-                         for name, parameter in estimated.items()}
+            estimate = {name: parameter.union(_estimates(problem, other, straight)[0][name])
+                        for name, parameter in estimate.items()}
     if not (straight or model.size):
-        warnings = [*warnings, *_if_joints_lag(problem, values, estimated, spread)]
+        warnings = [*warnings, *_lag_warnings(problem, values, estimate, spread)]
     fractions = {}
     for order in NUM_WEIGHTS:
-        there = problem.at_order(order)
-        rest = there.best_readouts(there.rephased(values) if order != problem.order else values)
+        refit = problem.at_order(order)
+        rest = refit.best_readouts(refit.rephased(values) if order != problem.order else values)
         fractions[order] = mean_share(joints.data.T, rest.residual.T)
-    rows = [(float(row[0]), tuple(row[1:].tolist())) for row in placed.weights.T]
-    misfit = problem.left(values) / joints.stated
+    rows = [(float(row[0]), tuple(row[1:].tolist())) for row in readout_fit.weights.T]
+    misfit = problem.residual_rms(values) / joints.errors
     count = len(problem.free)
     return Fit(
-        network=placed.orbit.network, gait=problem.gait, orbit=placed.orbit,
+        network=readout_fit.orbit.network, gait=problem.gait, orbit=readout_fit.orbit,
         order=problem.order, fractions=fractions, harmonics=problem.readout.harmonics,
-        duty=problem.duty(values), stance=problem.readout.stance, parameters=estimated,
+        duty=problem.duty(values), stance=problem.readout.stance, parameters=estimate,
         correlation=spread.correlation[:count, :count],
         cells=dict(zip(joints.names, (joints.cells + 1).tolist(), strict=True)),
         readouts=dict(zip(joints.names, rows, strict=True)), theta=joints.theta,
-        recorded=joints.data.T, errors=placed.residual.T, phase=float(values[-1]) % 1.0,
+        recorded=joints.data.T, errors=readout_fit.residual.T, phase=float(values[-1]) % 1.0,
         cost=problem.cost(values),
         sizes=dict(zip(joints.names, problem.sizes.tolist(), strict=True)),
         misfit=dict(zip(joints.names, misfit.tolist(), strict=True)), sharing=spread.inflation,
         model_error=model.size, starts=tuple(trials),
-        warnings=(*findings(problem.free, estimated, spread, model,
+        warnings=(*findings(problem.free, estimate, spread, model,
                             float(np.sqrt(np.mean(misfit**2))), best), *warnings))

@@ -79,9 +79,9 @@ class GaitReadout:
             weights: of x and y, shape (2, joints).
 
         """
-        stated = np.array([self.weights.get(name, np.zeros(2)) for name in names]).T
-        size = float(np.linalg.norm(stated) * np.linalg.norm(weights))
-        return float(np.sum(stated * weights)) / size if size > 0.0 else 0.0
+        targets = np.array([self.weights.get(name, np.zeros(2)) for name in names]).T
+        size = float(np.linalg.norm(targets) * np.linalg.norm(weights))
+        return float(np.sum(targets * weights)) / size if size > 0.0 else 0.0
 
 
 class OwnStance(NamedTuple):
@@ -100,18 +100,18 @@ class OwnStance(NamedTuple):
     d_fraction: np.ndarray
 
 
-def own_stance(seen: Signals, wave: int, peaks_at_0: bool, stance: tuple[float, float] | None
+def own_stance(signals: Signals, wave: int, peaks_at_0: bool, stance: tuple[float, float] | None
                ) -> OwnStance:
     """Return the stance of a leg without a duty, as motion.joint_readout.standing does.
 
     Args:
-        seen: the gait's signals.
+        signals: the gait's signals.
         wave: of the leading cell.
         peaks_at_0: whether the cell peaks at phase 0 for all parameters.
         stance: as of GaitReadout.
 
     """
-    terms, slopes = seen.terms[wave], seen.slopes[wave]
+    terms, slopes = signals.terms[wave], signals.slopes[wave]
     values = np.fft.irfft(np.append(terms[:1] * 2.0, terms[1:]), GRID_SIZE) * (0.5 * GRID_SIZE)
     crest, d_crest = 0.0, np.zeros(slopes.shape[1])
     if not peaks_at_0:
@@ -134,14 +134,14 @@ def _extremum(terms: np.ndarray, slopes: np.ndarray, phase: float) -> tuple[floa
     return phase % 1.0, -((1j * k * waves) @ slopes).real / (bend * TWO_PI if bend else np.inf)
 
 
-def retimed(theta: np.ndarray, duty: float, own: OwnStance, ahead: np.ndarray,
+def retimed(theta: np.ndarray, duty: float, stance: OwnStance, ahead: np.ndarray,
             members: np.ndarray, of_duty: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the phases at which the joints of a cell are read, and their derivatives.
 
     Args:
         theta: phases of cells, cycles, any shape.
         duty: fraction of the stride that the leg should stand.
-        own: its own stance.
+        stance: its own stance.
         ahead: phases of the cells before those of their legs' leading cells, cycles, likewise.
         members: derivatives of the parameters by the free numbers, (parameters, numbers).
         of_duty: derivatives of the duty factor by the free numbers, shape (numbers,).
@@ -150,15 +150,15 @@ def retimed(theta: np.ndarray, duty: float, own: OwnStance, ahead: np.ndarray,
         Phases, their derivatives by the free numbers, (..., numbers), and by theta.
 
     """
-    d_begin, d_fraction = own.d_begin @ members, own.d_fraction @ members
-    k = math.tan(0.5 * math.pi * own.fraction) / math.tan(0.5 * math.pi * duty)
-    d_k = k * math.pi * (d_fraction / math.sin(math.pi * own.fraction)
+    d_begin, d_fraction = stance.d_begin @ members, stance.d_fraction @ members
+    k = math.tan(0.5 * math.pi * stance.fraction) / math.tan(0.5 * math.pi * duty)
+    d_k = k * math.pi * (d_fraction / math.sin(math.pi * stance.fraction)
                          - of_duty / math.sin(math.pi * duty))
-    angle = math.pi * (theta - (own.begin + 0.5 * duty + ahead))
+    angle = math.pi * (theta - (stance.begin + 0.5 * duty + ahead))
     s, c = np.sin(angle), np.cos(angle)
     size = c * c + k * k * s * s
     steep = k / size
-    phases = own.begin + 0.5 * own.fraction + ahead + np.arctan2(k * s, c) / math.pi
-    moved = (np.multiply.outer(s * c / size / math.pi, d_k)
-             - np.multiply.outer(steep, d_begin + 0.5 * of_duty) + d_begin + 0.5 * d_fraction)
-    return phases, moved, steep
+    phases = stance.begin + 0.5 * stance.fraction + ahead + np.arctan2(k * s, c) / math.pi
+    derivative = (np.multiply.outer(s * c / size / math.pi, d_k)
+                  - np.multiply.outer(steep, d_begin + 0.5 * of_duty) + d_begin + 0.5 * d_fraction)
+    return phases, derivative, steep

@@ -31,9 +31,9 @@ from cpg_ros.fitting.inversion.recording_fit import fit_recording, RecordingFit
 from cpg_ros.fitting.inversion.results import (
     digest,
     FIT_FOLDER,
-    found,
     library,
     outline,
+    recordings_in,
     Results,
     write_page,
     write_tables,
@@ -137,22 +137,22 @@ def _facts(result: RecordingFit) -> dict[str, Any]:
 def _files(task: Task, result: RecordingFit) -> dict[str, str]:
     """Return the parameter file and the robot file, as they will be in their folder."""
     with TemporaryDirectory(prefix='cpg_ros_') as folder:
-        written = write_fitted(Path(folder, f'{task.name}.yaml'), result, task.settings.robot,
-                               robot_file_of(task.folder / f'{task.name}.yaml'))
-        return {path.name: path.read_text() for path in written}
+        paths = write_fitted(Path(folder, f'{task.name}.yaml'), result, task.settings.robot,
+                             robot_file_of(task.folder / f'{task.name}.yaml'))
+        return {path.name: path.read_text() for path in paths}
 
 
 def picture(result: RecordingFit) -> str:
     """Return the mean cycles of the joints that move most, recorded and fitted, as a small SVG."""
-    recorded, fitted = result.fit.recorded, result.fit.fitted
-    span = recorded.max(axis=1) - recorded.min(axis=1)
+    data, fitted = result.fit.recorded, result.fit.fitted
+    span = data.max(axis=1) - data.min(axis=1)
     largest = sorted(span.argsort()[::-1][:MAX_CURVES])
-    step = max(1, recorded.shape[1] // POINTS)
+    step = max(1, data.shape[1] // POINTS)
     lines = []
     for k, joint in enumerate(largest):
-        low, size = recorded[joint].min(), max(span[joint], 1e-9)
+        low, size = data[joint].min(), max(span[joint], 1e-9)
         width = WIDTH / len(largest)
-        for kind, row in (('r', recorded[joint]), ('f', fitted[joint])):
+        for kind, row in (('r', data[joint]), ('f', fitted[joint])):
             points = ' '.join(
                 f'{k * width + 0.9 * width * m / len(row[::step]):.0f},'
                 f'{HEIGHT - 3 - (HEIGHT - 6) * (value - low) / size:.0f}'
@@ -200,9 +200,9 @@ class Folders:
         library()
         self.folders, self.settings, self.progress = folders, settings, progress
         # Before the folder of results is made: one that is not there leaves nothing behind.
-        self.recordings = list(found(folders))
+        self.recordings = list(recordings_in(folders))
         self.results = Results(out, settings_digest(settings))
-        self.recordings = list(found(folders))
+        self.recordings = list(recordings_in(folders))
 
     def tasks(self, recordings: Iterable[Path]) -> Iterator[Task]:
         """Yield the jobs, each made when it is needed."""
@@ -246,9 +246,9 @@ class Folders:
         return self.write(tally.kept)
 
     def _through(self, executor: Executor, recordings: Sequence[Path], tally: JobProgress) -> None:
-        shown = {recording.absolute(): recording for recording in recordings}
+        names = {recording.absolute(): recording for recording in recordings}
         for outcome in outcomes(executor, invert_recording, self.tasks(recordings), tally.tick):
-            self.keep(outcome, shown[outcome.job.recording], tally)
+            self.keep(outcome, names[outcome.job.recording], tally)
 
     def watch(self, executor: Executor, say: Callable[[str], None],
               goes_on: Callable[[], bool] = lambda: True) -> Summary:
@@ -262,26 +262,26 @@ class Folders:
             goes_on: called before every check; False ends the watch.
 
         """
-        seen: dict[Path, Any] = {}
-        done: dict[Path, Any] = {}
-        written, waits = time.monotonic() - TABLE_PERIOD, False
+        previous: dict[Path, Any] = {}
+        outlines: dict[Path, Any] = {}
+        last_write, waits = time.monotonic() - TABLE_PERIOD, False
         try:
             while goes_on():
-                self.recordings = list(found(self.folders))
+                self.recordings = list(recordings_in(self.folders))
                 now = {recording: outline(recording) for recording in self.recordings}
                 ready = [recording for recording, at in now.items()
-                         if at == seen.get(recording) != done.get(recording)]
-                seen = now
+                         if at == previous.get(recording) != outlines.get(recording)]
+                previous = now
                 if ready:
                     for recording in ready:
                         say(f'new recording: {recording}')
                     with JobProgress('recordings', len(ready), self.progress) as tally:
                         self._through(executor, ready, tally)
-                    done |= {recording: now[recording] for recording in ready}
+                    outlines |= {recording: now[recording] for recording in ready}
                     waits = True
-                if waits and time.monotonic() - written >= TABLE_PERIOD:
+                if waits and time.monotonic() - last_write >= TABLE_PERIOD:
                     self.write()
-                    written, waits = time.monotonic(), False
+                    last_write, waits = time.monotonic(), False
                 time.sleep(SCAN_PERIOD)
         finally:
             summary = self.write()
@@ -292,11 +292,11 @@ class Folders:
         def rows() -> Iterator[dict[str, Any]]:
             return self.results.rows(self.recordings)
 
-        done = failed = 0
+        num_done = failed = 0
         for row in rows():
-            done += 1
+            num_done += 1
             failed += bool(row['reason'])
         page = self.results.folder / 'index.html'
-        written = write_tables(self.results.folder, rows)
-        write_page(page, rows(), done, failed)
-        return Summary(done, failed, kept, (*written, page))
+        paths = write_tables(self.results.folder, rows)
+        write_page(page, rows(), num_done, failed)
+        return Summary(num_done, failed, kept, (*paths, page))

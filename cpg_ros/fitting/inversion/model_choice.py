@@ -102,7 +102,7 @@ def compare_networks(recording: Recording, robot: Robot | None = None, order: in
             comparisons.append(NetworkComparison(kind.name, '', why=(
                 f'its nearest gait, {stride.nearest}, is {stride.distance:.3f} of a cycle off')))
             continue
-        half, others = split_strides(recording, stride)
+        half, rest = split_strides(recording, stride)
         parameters = preset_of(kind.name, gait).network.with_phases(stride.phases)
         done(count / len(kinds))
         try:
@@ -113,28 +113,29 @@ def compare_networks(recording: Recording, robot: Robot | None = None, order: in
             continue
         free = len(fit.parameters) + len(kind.offsets) - bool(kind.offsets)
         rows = [half.joints.index(name) for name in fit.joints]
-        rms = rms_shares(others[rows], fit.fitted - others[rows])
+        rms = rms_shares(rest[rows], fit.fitted - rest[rows])
         fractions = {name: value for name, value in zip(fit.joints, rms.tolist(), strict=True)
                      if np.isfinite(value)}
         comparisons.append(NetworkComparison(
             kind.name, gait, float(np.mean(list(fractions.values()) or [0.0])), fit.mean_rms_share,
             free, free + len(fit.joints) * (1 + NUM_WEIGHTS[fit.order]), by_joint=fractions))
     done(1.0)
-    least = min(comparisons, key=lambda comparison: (comparison.error, comparison.numbers))
+    best = min(comparisons, key=lambda comparison: (comparison.error, comparison.numbers))
     comparisons = [replace(comparison, alike=not comparison.why
-                           and not _distinct(comparison, least)) for comparison in comparisons]
-    return sorted(comparisons, key=lambda comparison: (not comparison.alike, comparison.numbers
-                                                       if comparison.alike else comparison.error))
+                           and not _distinct(comparison, best)) for comparison in comparisons]
+    return sorted(comparisons, key=lambda comparison: (
+        not comparison.alike,
+        comparison.numbers if comparison.alike else comparison.error))
 
 
-def _distinct(comparison: NetworkComparison, least: NetworkComparison) -> bool:
+def _distinct(comparison: NetworkComparison, best: NetworkComparison) -> bool:
     """Return whether a network's errors exceed the least ones by more than their scatter."""
-    if comparison is least:
+    if comparison is best:
         return False
-    more = np.array([error - least.by_joint[name] for name, error in comparison.by_joint.items()
-                     if name in least.by_joint])
+    more = np.array([error - best.by_joint[name] for name, error in comparison.by_joint.items()
+                     if name in best.by_joint])
     if more.size < 2:
-        return comparison.error > least.error
+        return comparison.error > best.error
     return bool(more.mean() > MIN_DIFFERENCE * more.std(ddof=1) / np.sqrt(more.size))
 
 
@@ -163,10 +164,10 @@ def split_strides(recording: Recording, stride: Stride) -> tuple[Stride, np.ndar
 
 def indistinguishable(comparisons: Sequence[NetworkComparison], order: int) -> str:
     """Name the networks that a recording cannot distinguish by readouts of an order, or ''."""
-    alike = [comparison.network for comparison in comparisons if comparison.alike]
-    if len(alike) < 2:
+    names = [comparison.network for comparison in comparisons if comparison.alike]
+    if len(names) < 2:
         return ''
-    text = (f'the recording does not distinguish {", ".join(alike[:-1])} and {alike[-1]}; the one '
+    text = (f'the recording does not distinguish {", ".join(names[:-1])} and {names[-1]}; the one '
             'with the fewest parameters is fitted')
     return text if order == 1 else f'{text}; a readout of order 1 (--order 1) may tell more'
 
@@ -175,7 +176,7 @@ def as_rows(comparisons: Sequence[NetworkComparison]) -> list[tuple[str, ...]]:
     """Return rows of a table, with a head."""
     rows: list[tuple[str, ...]] = [('network', 'gait', 'held-out error', 'fitted', 'parameters',
                                     'all numbers', 'told from the least')]
-    least = min((comparison.error for comparison in comparisons), default=np.inf)
+    lowest = min((comparison.error for comparison in comparisons), default=np.inf)
     for comparison in comparisons:
         if comparison.why:
             rows.append((comparison.network, comparison.gait or 'none', '-', '-', '-', '-',
@@ -184,5 +185,5 @@ def as_rows(comparisons: Sequence[NetworkComparison]) -> list[tuple[str, ...]]:
         rows.append((comparison.network, comparison.gait, f'{100 * comparison.error:.2f} %',
                      f'{100 * comparison.fitted:.2f} %', str(comparison.parameters),
                      str(comparison.numbers),
-                     '' if comparison.error == least else 'no' if comparison.alike else 'yes'))
+                     '' if comparison.error == lowest else 'no' if comparison.alike else 'yes'))
     return rows

@@ -117,11 +117,11 @@ def fit_cycle(samples: np.ndarray, theta: np.ndarray, start: Delayed, gait: str,
 
     # The method evaluates residual and derivative at the same values, one after the other.
     @lru_cache(maxsize=1)
-    def solved(values: tuple[float, ...]) -> Orbit:
+    def orbit_of(values: tuple[float, ...]) -> Orbit:
         return solve_orbit(with_values(start, free, values), gait)
 
     def orbit_at(values: np.ndarray) -> Orbit:
-        return solved(tuple(values.tolist()))
+        return orbit_of(tuple(values.tolist()))
 
     def evaluate(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         states, slopes = cycle_samples(orbit_at(values), theta)
@@ -129,11 +129,11 @@ def fit_cycle(samples: np.ndarray, theta: np.ndarray, start: Delayed, gait: str,
 
     trial = minimise(evaluate, begin, np.array([parameter.low for parameter in free]),
                      np.array([parameter.high for parameter in free]), TOLERANCE)
-    if trial.why:
-        raise NoOrbit(trial.why)
-    left, slopes = evaluate(trial.values)
-    return CycleFit(orbit_at(trial.values), trial.values, trial.cost, slopes.T @ left,
-                    left.reshape(samples.shape), trial)
+    if trial.reason:
+        raise NoOrbit(trial.reason)
+    residual, slopes = evaluate(trial.values)
+    return CycleFit(orbit_at(trial.values), trial.values, trial.cost, slopes.T @ residual,
+                    residual.reshape(samples.shape), trial)
 
 
 # A recorded gait inverted as Liu & Zhang (2024) do it: eight joints taken for the eight cells.
@@ -231,6 +231,6 @@ def _shift(orbit: Orbit, theta: np.ndarray, samples: np.ndarray) -> float:
     def gap(shift: float) -> float:
         return float(np.sum((cycle_samples(orbit, theta + shift)[0] - samples)**2))
 
-    near = min(np.arange(NUM_SHIFTS) / NUM_SHIFTS, key=gap)
+    start = min(np.arange(NUM_SHIFTS) / NUM_SHIFTS, key=gap)
     return float(minimize_scalar(gap, method='bounded', options={'xatol': 1e-9},
-                                 bounds=(near - 1.0 / NUM_SHIFTS, near + 1.0 / NUM_SHIFTS)).x)
+                                 bounds=(start - 1.0 / NUM_SHIFTS, start + 1.0 / NUM_SHIFTS)).x)

@@ -65,10 +65,10 @@ def fitted_robot(result: RecordingFit, robot: Robot | None) -> Robot:
         robot = replace(robot, networks=networks, harmonics=fit.harmonics, motions=remaining)
         motion = fitted_motion(result, robot)
         for fraction in IN_PLACE_FACTORS:
-            moved = replace(robot, motions={**remaining, fit.gait: _scaled(motion, fraction)})
-            if _within_limits(moved, result):
+            trial = replace(robot, motions={**remaining, fit.gait: _scale(motion, fraction)})
+            if _within_limits(trial, result):
                 break
-        return moved
+        return trial
     network = type(fit.network)
     assignment = next(iter(network.legs))
     for leg in network.legs[assignment]:
@@ -76,7 +76,7 @@ def fitted_robot(result: RecordingFit, robot: Robot | None) -> Robot:
             raise InputError(f'{result.recording.source}: no joint of {leg} was recorded, and the '
                              f'network {network.name} drives '
                              f'{", ".join(network.legs[assignment])}: a robot file is needed')
-    legs = {leg: tuple(_guessed(name, leg, result) for name in names)
+    legs = {leg: tuple(_default_joint(name, leg, result) for name in names)
             for leg, names in result.legs.items()}
     order = tuple(name for name in result.recording.joints if name in fit.readouts)
     # Without its frequency the gait would run at the generator's usual one.
@@ -85,7 +85,7 @@ def fitted_robot(result: RecordingFit, robot: Robot | None) -> Robot:
                                    stance=fit.stance)})
 
 
-def _scaled(motion: Motion, fraction: float) -> Motion:
+def _scale(motion: Motion, fraction: float) -> Motion:
     """Return a motion with the weights at a stride of 0 multiplied by a number."""
     return replace(motion, joints={
         name: replace(joint, in_place=tuple(fraction * weight for weight in joint.in_place))
@@ -152,7 +152,7 @@ def _slower(table: SteeringTable | None, frequency: float) -> SteeringTable | No
     return SteeringTable(*zip(*rows, strict=True)) if rows else None
 
 
-def _guessed(name: str, leg: str, result: RecordingFit) -> Joint:
+def _default_joint(name: str, leg: str, result: RecordingFit) -> Joint:
     fit = result.fit
     offset, weights = fit.readouts[name]
     row = fit.joints.index(name)
@@ -180,9 +180,9 @@ def running_parameters(result: RecordingFit, robot: Robot | None = None) -> dict
         return settings
     motion = robot.motion(fit.gait, fit.gait)
     # In a fit without a duty, legs stand for as long as their cells make them.
-    own = (standing(fit.orbit, robot.leg_cells, fit.harmonics)[1].mean() if motion.stance is None
-           else motion.stance[1])
-    duty = fit.duty or (0.0 if motion.duty is None else float(own))
+    stance = (standing(fit.orbit, robot.leg_cells, fit.harmonics)[1].mean()
+              if motion.stance is None else motion.stance[1])
+    duty = fit.duty or (0.0 if motion.duty is None else float(stance))
     return {**settings, 'amplitude': 1.0, 'duty': duty,
             **{READOUT_PREFIX + name: [float(offset), *map(float, weights)]
                for name, (offset, weights) in fit.readouts.items()}}
@@ -198,13 +198,13 @@ def parameter_tree(result: RecordingFit, robot: Path) -> dict[str, Any]:
                            for name, value in fit.network.as_dict().items()}}}}
 
 
-def check_plan(tree: Mapping[str, Any], robot: Path, who: str) -> None:
+def check_plan(tree: Mapping[str, Any], robot: Path, name: str) -> None:
     """Plan the gait as the generator does, from the written files.
 
     Args:
         tree: as of parameter_tree.
         robot: the robot file.
-        who: owner of the plan, for the error.
+        name: owner of the plan, for the error.
 
     Raises:
         InputError: the generator would refuse it.
@@ -217,7 +217,7 @@ def check_plan(tree: Mapping[str, Any], robot: Path, who: str) -> None:
         plan(read_robot(robot), tree['gait'], kind.presets()[tree['gait']], network,
              tree['frequency'], tree['amplitude'])
     except PlanError as error:
-        raise InputError(f'{who} cannot do this: {error}') from error
+        raise InputError(f'{name} cannot do this: {error}') from error
 
 
 def write_fitted(path: str | Path, result: RecordingFit, robot: Robot | None = None,
@@ -247,15 +247,15 @@ def write_fitted(path: str | Path, result: RecordingFit, robot: Robot | None = N
                f'{result.recording.source}\nmean RMS error '
                f'{100 * result.fit.mean_rms_share:.1f} % of '
                f"the joints' range, readout of order {result.fit.order}")
-    moved, tree = fitted_robot(result, robot), parameter_tree(
+    new_robot, tree = fitted_robot(result, robot), parameter_tree(
         result, (named or beside).resolve())
     comment = ''.join(f'# {line}\n' for line in summary.splitlines())
     with TemporaryDirectory(prefix='.', dir=path.absolute().parent) as folder:
         parameters, joints = Path(folder, path.name), Path(folder, beside.name)
-        write_robot(joints, moved, summary)
+        write_robot(joints, new_robot, summary)
         write_atomically(parameters, comment + yaml.safe_dump(tree, sort_keys=False))
         check_plan(yaml.safe_load(parameters.read_text()), joints,
-                   f'{result.recording.source}: robot {moved.name}')
+                   f'{result.recording.source}: robot {new_robot.name}')
         joints.replace(beside)
         parameters.replace(path)
     return [path, beside]

@@ -98,10 +98,10 @@ def fit_with_fallbacks(cycle: Stride, cells: Mapping[str, int], network: Network
                straight: bool = False) -> Fit:
         if not names:
             # Phases are known beforehand, and no other parameter shows.
-            return _as_it_is(cycle, cells, network, gait, lower, readout, done)
-        same = tuple(name for name in names if name != GAIT_DUTY)
+            return _fit_fixed(cycle, cells, network, gait, lower, readout, done)
+        without_duty = tuple(name for name in names if name != GAIT_DUTY)
         return invert(cycle, cells, network, gait, names, lower, begins, readout=readout,
-                      orbits=orbits.setdefault(same, Orbits()), straight=straight,
+                      orbits=orbits.setdefault(without_duty, Orbits()), straight=straight,
                       loaded=loaded, done=done)
 
     for names, lower, begins, relaxation in _ways(free_names, order, starts):
@@ -111,7 +111,7 @@ def fit_with_fallbacks(cycle: Stride, cells: Mapping[str, int], network: Network
                 duty = () if free or begins else (GAIT_DUTY,)
                 fit = fitted((*names, *duty), lower, begins)
             else:
-                fit, notes = _with_duty_if_told(names, lower, fitted)
+                fit, notes = _fit_duty_if_identifiable(names, lower, fitted)
         except NoOrbit as error:
             first = first or str(error)
             continue
@@ -120,36 +120,37 @@ def fit_with_fallbacks(cycle: Stride, cells: Mapping[str, int], network: Network
             return fit, (*notes, *((f'not fitted as asked for: {first}; {relaxation} instead',)
                                    if relaxation else ()))
         first = first or f'the generator would refuse the {gait} that fits best: {reason}'
-    fit = _as_it_is(cycle, cells, network, gait, order, readout, done)
+    fit = _fit_fixed(cycle, cells, network, gait, order, readout, done)
     if reason := validate_orbit(fit.orbit, gait, fit.harmonics):
         raise NoOrbit(f'{first}; nor does the generator run the parameters given: {reason}')
     return fit, (f'not fitted as asked for: {first}; the parameters stay those of the preset, '
                  'only the readouts are fitted',)
 
 
-def _with_duty_if_told(names: tuple[str, ...], order: int,
+def _fit_duty_if_identifiable(names: tuple[str, ...], order: int,
                        fitted: Callable[..., Fit]
                        ) -> tuple[Fit, tuple[str, ...]]:
     """Fit without a duty, unless the recording shows that it differs from the cells'."""
     try:
-        other = fitted((*names, GAIT_DUTY), order, (), True)
+        with_duty = fitted((*names, GAIT_DUTY), order, (), True)
     except NoOrbit:
         return fitted(names, order, ()), ()
-    minima = [dict(zip(other.free, minimum.values.tolist(), strict=False))
-              for minimum in other.minima]
-    own = fitted(names, order, [{}, *({name: minimum[name] for name in names}
-                                      for minimum in minima[:2])])
-    sizes = np.array(list(other.sizes.values()))[:, None]
-    rise = 0.5 * float(np.sum((own.errors / sizes)**2)) - other.cost
-    if rise > 0.5 * DUTY_THRESHOLD**2 * other.sharing:
+    minima = [dict(zip(with_duty.free, minimum.values.tolist(), strict=False))
+              for minimum in with_duty.minima]
+    without_duty = fitted(names, order, [{}, *({name: minimum[name] for name in names}
+                                               for minimum in minima[:2])])
+    sizes = np.array(list(with_duty.sizes.values()))[:, None]
+    rise = 0.5 * float(np.sum((without_duty.errors / sizes)**2)) - with_duty.cost
+    if rise > 0.5 * DUTY_THRESHOLD**2 * with_duty.sharing:
         return fitted((*names, GAIT_DUTY), order, minima), ()
-    known = other.parameters[GAIT_DUTY].stderr < MAX_DUTY_STDERR or np.isinf(other.model_error)
-    return own, () if known else (
+    duty = with_duty.parameters[GAIT_DUTY]
+    clear = duty.stderr < MAX_DUTY_STDERR or np.isinf(with_duty.model_error)
+    return without_duty, () if clear else (
         'the recording does not determine how long the legs stand: the fit and its intervals '
         "assume the duty factor of the network's cells",)
 
 
-def _as_it_is(cycle: Stride, cells: Mapping[str, int], network: Network, gait: str, order: int,
+def _fit_fixed(cycle: Stride, cells: Mapping[str, int], network: Network, gait: str, order: int,
               readout: GaitReadout, done: Callable[[float], None]) -> Fit:
     """Fit the readouts alone; all parameters of the network keep their values."""
     name = next(iter(network.parameters()))
@@ -228,7 +229,7 @@ class RecordingFit(ShortRepr):
                        for name in fit.joints},
             'starts': [{'start': dict(zip(fit.free, trial.start.tolist(), strict=False)),
                         'end': dict(zip(fit.free, trial.values.tolist(), strict=False)),
-                        'iterations': trial.iterations, 'cost': trial.cost, 'why': trial.why}
+                        'iterations': trial.iterations, 'cost': trial.cost, 'why': trial.reason}
                        for trial in fit.starts],
             'minima': [{**dict(zip(fit.free, trial.values.tolist(), strict=False)),
                         'cost': trial.cost} for trial in fit.minima],
@@ -276,9 +277,9 @@ def leg_joints(recording: Recording, robot: Robot | None
         raise InputError(f'{recording.source}: none of the joints of robot {robot.name} is '
                          f'there: it has {", ".join(recording.joints)}; the robot has '
                          f'{", ".join(missing)}: rename either, or leave out --robot')
-    read = f'legs and cells are those of robot {robot.name}'
+    note = f'legs and cells are those of robot {robot.name}'
     return ({leg: names for leg, names in legs.items() if names},
-            read + (f'; not recorded: {", ".join(missing)}' if missing else ''))
+            note + (f'; not recorded: {", ".join(missing)}' if missing else ''))
 
 
 def networks_of(robot: Robot | None, legs: Iterable[str]) -> Iterator[type[Network]]:
@@ -326,12 +327,12 @@ def _steady(recording: Recording, legs: Mapping[str, Sequence[str]], kind: type[
     try:
         return recording, *stride_of(recording, legs, kind, robot, gait), []
     except NoSteadyGait:
-        recognised = recognise_stride(recording)
-        if recognised is None:
+        copies = recognise_stride(recording)
+        if copies is None:
             raise
-    cells, stride = stride_of(recognised, legs, kind, robot, gait)
-    return recognised, cells, replace(stride, confidence=0.5 * stride.confidence), [
-        f'taken for exactly one stride of {recognised.cycle:.4g} s, as it ends where it begins: '
+    cells, stride = stride_of(copies, legs, kind, robot, gait)
+    return copies, cells, replace(stride, confidence=0.5 * stride.confidence), [
+        f'taken for exactly one stride of {copies.cycle:.4g} s, as it ends where it begins: '
         'confirm this (--cycle), or record several strides']
 
 
@@ -380,8 +381,8 @@ def network_for(network: str, legs: Mapping[str, Sequence[str]], robot: Robot | 
 def _parameters(kind: type[Network], gait: str, preset: str, stride: Stride) -> Network:
     """Return the parameters of a preset, with the phases recorded if they leave it its gait."""
     parameters = preset_of(kind.name, preset or gait).network
-    as_recorded = parameters.with_phases(stride.phases)
-    return parameters if other_gait(as_recorded, gait) else as_recorded
+    with_phases = parameters.with_phases(stride.phases)
+    return parameters if other_gait(with_phases, gait) else with_phases
 
 
 def fit_recording(recording: Recording, robot: Robot | None = None, network: str = '',
@@ -410,7 +411,7 @@ def fit_recording(recording: Recording, robot: Robot | None = None, network: str
     """
     if np.isnan(recording.cycle):
         recording = repeat_stride(recording)
-    legs, read = leg_joints(recording, robot)
+    legs, note = leg_joints(recording, robot)
     kind = network_for(network, legs, robot)
     recording, cells, stride, warnings = _steady(recording, legs, kind, robot, gait)
     if not (gait or stride.gait or network or kind.offsets):
@@ -437,10 +438,10 @@ def fit_recording(recording: Recording, robot: Robot | None = None, network: str
         GaitReadout.of(kind, gait, preset, robot),
         stride.contacts is not None and not recording.commanded, done)
     fit = replace(fit, parameters={**fit.parameters, **_phases_as_estimates(fit, stride)})
-    if robot is None and any(len(own) > 1 for own in next(iter(kind.legs.values())).values()):
-        read += ("; joints are assigned to their leg's first cell, as there is no robot file: "
+    if robot is None and any(len(ids) > 1 for ids in next(iter(kind.legs.values())).values()):
+        note += ("; joints are assigned to their leg's first cell, as there is no robot file: "
                  'parameters and intervals hold for this assignment only')
-    result = RecordingFit(recording, read, legs, stride, fit,
+    result = RecordingFit(recording, note, legs, stride, fit,
                           (*warnings, *fallbacks, *fit.warnings))
     return result if not result.poor else replace(result, warnings=(
         f"a poor fit: {100.0 * fit.mean_rms_share:.0f} % of the joints' range are left on "

@@ -37,7 +37,7 @@ MARKER_FILE = 'cpg_ros_results.json'
 BLOCK_SIZE = 1 << 20
 
 
-def found(folders: Sequence[Path]) -> Iterator[Path]:
+def recordings_in(folders: Sequence[Path]) -> Iterator[Path]:
     """Yield the recordings in folders, each of which may be one, sorted, each once.
 
     A folder that a format recognises as one recording is one; otherwise each file with a known
@@ -47,13 +47,13 @@ def found(folders: Sequence[Path]) -> Iterator[Path]:
         InputError: a folder does not exist.
 
     """
-    seen: set[Path] = set()
+    paths: set[Path] = set()
     for folder in folders:
         if not folder.exists():
             raise InputError(f'{folder}: there is no such folder')
         for path in _below(folder):
-            if (resolved := path.resolve()) not in seen:
-                seen.add(resolved)
+            if (target := path.resolve()) not in paths:
+                paths.add(target)
                 yield path
 
 
@@ -67,10 +67,10 @@ def _below(folder: Path) -> Iterator[Path]:
         return
     try:
         inside = sorted(folder.iterdir())
-        whole = bool(files_of(folder))
+        complete = bool(files_of(folder))
     except PermissionError:
-        inside, whole = [], True
-    if whole:
+        inside, complete = [], True
+    if complete:
         yield folder
         return
     for entry in inside:
@@ -173,10 +173,10 @@ class Results:
             for ending in ('.yaml', '_robot.yaml'):
                 name = f'{self.name(recording)}{ending}'
                 (self.folder / FIT_FOLDER / name).unlink(missing_ok=True)
-        stored = {'file': printable(str(recording)), 'settings': self.settings, **row,
+        entry = {'file': printable(str(recording)), 'settings': self.settings, **row,
                 'reason': printable(row['reason']),
                 'fitted': str(Path(FIT_FOLDER, next(iter(files)))) if files else ''}
-        write_atomically(self._place(recording), json.dumps(stored))
+        write_atomically(self._place(recording), json.dumps(entry))
 
     def name(self, recording: Path) -> str:
         """Return the name of a recording's fitted file, without its ending."""

@@ -65,7 +65,7 @@ class LegStrides(ShortRepr):
         retractions: s, from foremost to hindmost, or in stance, shape (n,); nan if the direction
             is unknown.
         range: of the joint in the mean cycle, rad.
-        why: why retraction and protraction cannot be distinguished, or ''.
+        reason: why retraction and protraction cannot be distinguished, or ''.
         by_contacts: whether the strides are those of the foot's contacts, not of the joint.
 
     """
@@ -76,7 +76,7 @@ class LegStrides(ShortRepr):
     periods: np.ndarray
     retractions: np.ndarray
     range: float  # noqa: A003
-    why: str = ''
+    reason: str = ''
     by_contacts: bool = False
 
     def _summary(self) -> str:
@@ -115,7 +115,7 @@ def leg_strides(recording: Recording, legs: Mapping[str, Sequence[str]], stride:
     strides = []
     for leg in stride.phases:
         names = [name for name in legs[leg] if name in c]
-        joint, sense, why = _leading(names, c)
+        joint, sense, reason = _leading(names, c)
         x = sense * recording.positions[inside, recording.joints.index(joint)]
         span = float(np.ptp(evaluate_coefficients(c[joint][:, None], np.arange(POINTS) / POINTS)))
         if contacts is not None:
@@ -123,11 +123,11 @@ def leg_strides(recording: Recording, legs: Mapping[str, Sequence[str]], stride:
             strides.append(LegStrides(leg, joint, begins, periods, stances, span, '', True))
             continue
         fore = _extremes(times, phases, x, sense * c[joint], 1.0)
-        hind = None if why else _extremes(times, phases, x, sense * c[joint], -1.0)
+        hind = None if reason else _extremes(times, phases, x, sense * c[joint], -1.0)
         rows = _strides(fore, hind)
         # Copies of one stride are one stride.
-        begins, periods, back = rows[:1 if stride.cycles == 1 else None].T
-        strides.append(LegStrides(leg, joint, begins, periods, back, span, why))
+        begins, periods, liftoffs = rows[:1 if stride.cycles == 1 else None].T
+        strides.append(LegStrides(leg, joint, begins, periods, liftoffs, span, reason))
     return strides
 
 
@@ -137,17 +137,17 @@ def _words(name: str) -> set[str]:
 
 def _leading(names: Sequence[str], c: Mapping[str, np.ndarray]) -> tuple[str, float, str]:
     """Return the joint to use, its direction of protraction, and why that is unknown."""
-    def most(listed: Sequence[str]) -> str:
+    def strongest(listed: Sequence[str]) -> str:
         return max(listed, key=lambda name: float(np.abs(c[name][1])))
 
     upper = [name for name in names if _words(name) & PROXIMAL]
     lower = [name for name in names if _words(name) & DISTAL]
-    joint = most(upper or names)
+    joint = strongest(upper or names)
     if not upper:
         return joint, 1.0, f'no joint of {", ".join(names)} is called like a hip'
     if not lower:
         return joint, 1.0, f'no joint of {", ".join(names)} is called like a knee'
-    bending = most(lower)
+    bending = strongest(lower)
     theta = np.arange(POINTS) / POINTS
     x, y = evaluate_coefficients(np.column_stack([c[joint], c[bending]]), theta)
     size, mean = float(np.std(y)), float(np.mean(y))
@@ -155,11 +155,11 @@ def _leading(names: Sequence[str], c: Mapping[str, np.ndarray]) -> tuple[str, fl
     skewness = float(np.mean((y - mean)**3)) / size**3 if size else 0.0
     if abs(skewness) < MIN_SKEWNESS and (abs(mean) < MIN_MEAN_RATIO * size or not size):
         return joint, 1.0, f'the direction in which {bending} bends is unknown'
-    bent = np.sign(skewness if abs(skewness) >= MIN_SKEWNESS else mean) * y
+    bend = np.sign(skewness if abs(skewness) >= MIN_SKEWNESS else mean) * y
     # From its smallest to its largest angle the joint rises.
-    least, largest = theta[np.argmin(x)], theta[np.argmax(x)]
-    rising = (theta - least) % 1.0 < (largest - least) % 1.0
-    more = float(bent[rising].mean() - bent[~rising].mean())
+    smallest, largest = theta[np.argmin(x)], theta[np.argmax(x)]
+    rising = (theta - smallest) % 1.0 < (largest - smallest) % 1.0
+    more = float(bend[rising].mean() - bend[~rising].mean())
     if abs(more) < MIN_BEND_DIFFERENCE * size:
         return joint, 1.0, f'{bending} is bent as much in one stroke of {joint} as in the other'
     return joint, float(np.sign(more)), ''
@@ -172,40 +172,40 @@ def _extremes(times: np.ndarray, phases: np.ndarray, x: np.ndarray, c: np.ndarra
     peak = float(theta[np.argmax(side * evaluate_coefficients(c[:, None], theta)[0])])
     extremes = []
     for k in range(int(np.floor(phases[0] - peak)), int(np.ceil(phases[-1] - peak)) + 1):
-        near = (np.abs(phases - peak - k) <= SEARCH_RANGE + FIT_HALF_WIDTH) & np.isfinite(x)
-        at = _summit(phases[near], side * x[near], peak + k)
+        nearby = (np.abs(phases - peak - k) <= SEARCH_RANGE + FIT_HALF_WIDTH) & np.isfinite(x)
+        at = _summit(phases[nearby], side * x[nearby], peak + k)
         if at is not None:
             extremes.append((float(np.interp(at, phases, times)), at))
     return np.array(extremes).reshape(-1, 2)
 
 
-def _summit(phases: np.ndarray, x: np.ndarray, expected: float) -> float | None:
+def _summit(phases: np.ndarray, x: np.ndarray, guess: float) -> float | None:
     """Return where two half parabolas that meet at their vertex fit best, or None.
 
     The strokes on either side of an extreme have different durations, so its sides have different
     slopes: a vertex of a symmetric fit, and a mean of unequal strides, are biased towards the
     slower stroke.
     """
-    tried = expected + np.linspace(-SEARCH_RANGE, SEARCH_RANGE, NUM_CANDIDATES)
+    candidates = guess + np.linspace(-SEARCH_RANGE, SEARCH_RANGE, NUM_CANDIDATES)
     misfits = np.full(NUM_CANDIDATES, np.inf)
-    for k, at in enumerate(tried):
-        near = np.abs(phases - at) <= FIT_HALF_WIDTH
-        before, after = (near & (phases < at)).sum(), (near & (phases > at)).sum()
+    for k, at in enumerate(candidates):
+        nearby = np.abs(phases - at) <= FIT_HALF_WIDTH
+        before, after = (nearby & (phases < at)).sum(), (nearby & (phases > at)).sum()
         if min(before, after) < MIN_SIDE_SAMPLES:
             continue
-        off = phases[near] - at
+        off = phases[nearby] - at
         rows = np.column_stack([np.ones(off.size), np.minimum(off, 0.0)**2,
                                 np.maximum(off, 0.0)**2])
-        fitted = np.linalg.lstsq(rows, x[near])[0]
-        if max(fitted[1:]) < 0.0:
-            misfits[k] = np.mean((rows @ fitted - x[near])**2)
+        coefficients = np.linalg.lstsq(rows, x[nearby])[0]
+        if max(coefficients[1:]) < 0.0:
+            misfits[k] = np.mean((rows @ coefficients - x[nearby])**2)
     k = int(np.argmin(misfits))
     if not 0 < k < NUM_CANDIDATES - 1 or not np.isfinite(misfits[k - 1:k + 2]).all():
         return None
     low, middle, high = misfits[k - 1:k + 2]
     bend = low - 2.0 * middle + high
     between = 0.5 * (low - high) / bend if bend > 0.0 else 0.0
-    return float(tried[k] + between * (tried[1] - tried[0]))
+    return float(candidates[k] + between * (candidates[1] - candidates[0]))
 
 
 def _strides(fore: np.ndarray, hind: np.ndarray | None) -> np.ndarray:
@@ -252,7 +252,7 @@ def every_stride(legs: list[LegStrides]) -> Rows:
         for k, begin in enumerate(leg.begins):
             values = [(getattr(leg, attribute)[k], form) for *_, attribute, form in QUANTITIES]
             rows.append((leg.leg, str(k + 1), f'{begin:.4f}',
-                         *(_shown(value, form) for value, form in values)))
+                         *(_format(value, form) for value, form in values)))
     return rows
 
 
@@ -361,24 +361,24 @@ def symmetry(legs: list[LegStrides]) -> Rows:
     both sides are alike.
     """
     rows: Rows = [('left - right', *_names(legs), 'range')]
-    named = {strides.leg: strides for strides in legs}
-    for leg, left in named.items():
-        right = named.get('right' if leg == 'left' else 'r' + leg[1:])
+    by_leg = {strides.leg: strides for strides in legs}
+    for leg, strides_left in by_leg.items():
+        right = by_leg.get('right' if leg == 'left' else 'r' + leg[1:])
         if right is None or not leg.startswith('l'):
             continue
-        pairs = [(_mean(getattr(left, attribute)), _mean(getattr(right, attribute)))
+        pairs = [(_mean(getattr(strides_left, attribute)), _mean(getattr(right, attribute)))
                  for *_, attribute, _ in QUANTITIES]
         rows.append((f'{leg} - {right.leg}', *(
             'cannot tell' if not a + b > 0.0 else f'{200.0 * (a - b) / (a + b):+.1f} %'
-            for a, b in [*pairs, (left.range, right.range)])))
+            for a, b in [*pairs, (strides_left.range, right.range)])))
     return rows
 
 
 def notes(legs: list[LegStrides], contacts: FootContacts | None = None) -> list[str]:
     """Return the basis of the strokes, one line each."""
-    by_angles = [strides.leg for strides in legs if not strides.why and not strides.by_contacts]
-    lines = [f'{strides.leg}: cannot tell retraction from protraction: {strides.why}'
-             for strides in legs if strides.why]
+    by_angles = [strides.leg for strides in legs if not strides.reason and not strides.by_contacts]
+    lines = [f'{strides.leg}: cannot tell retraction from protraction: {strides.reason}'
+             for strides in legs if strides.reason]
     if contacts is not None and legs[0].by_contacts:
         lines.insert(0, f'stance and swing are those of {contacts.source}: strides begin with a '
                      'touchdown')
@@ -400,5 +400,5 @@ def _mean(values: np.ndarray) -> float:
     return float(values.mean()) if len(values) else float('nan')
 
 
-def _shown(value: float, form: str) -> str:
+def _format(value: float, form: str) -> str:
     return f'{value:{form}}' if np.isfinite(value) else ''

@@ -134,8 +134,8 @@ class Delayed(Network):
     def least_coupling(self, gait: str) -> LeastCoupling:
         """Roots of ``lambda = A + B exp(-lambda tau)`` cross where |B| > |Re A|."""
         shift = self.modes()[gait][0] / leg_count(type(self))
-        least = abs(self.a + self.b + self.d * round(math.cos(2.0 * math.pi * shift), 15))
-        return LeastCoupling('|c|', abs(self.c), least)
+        minimum = abs(self.a + self.b + self.d * round(math.cos(2.0 * math.pi * shift), 15))
+        return LeastCoupling('|c|', abs(self.c), minimum)
 
     def sufficient_gain(self, rate: float) -> float:
         """Return a symmetry gain at which every gait is attracting, 1/model time.

@@ -71,12 +71,12 @@ def ring_gaits(legs: int) -> dict[str, tuple[int, int]]:
     """
     if legs == 4:
         return GAITS
-    opposed, together = _ALTERNATING.get(legs, ('alternating', 'lurch'))
+    antiphase, in_phase = _ALTERNATING.get(legs, ('alternating', 'lurch'))
     half = legs // 2
     # Long waves forward do not attract: the same ones from hind to fore take over.
     reverse = {'reverse_ripple': (2, 1), 'reverse_wave': (1, 1)} if legs <= 8 else {}
-    return {opposed: (half, 1), 'ripple': (-2, 1), 'wave': (-1, 1), **reverse, 'pace': (0, 1),
-            'pronk': (0, 0), together: (half, 0), 'inchworm': (-2, 0), 'caterpillar': (-1, 0)}
+    return {antiphase: (half, 1), 'ripple': (-2, 1), 'wave': (-1, 1), **reverse, 'pace': (0, 1),
+            'pronk': (0, 0), in_phase: (half, 0), 'inchworm': (-2, 0), 'caterpillar': (-1, 0)}
 
 
 @cache
@@ -143,24 +143,24 @@ def gait_phases(legs: int) -> dict[str, tuple[Fraction, ...]]:
 
 def _even(phases: tuple[Fraction, ...]) -> bool:
     """Return whether the phases are evenly spread, with equally many legs at each."""
-    different = sorted(set(phases))
-    return (different == [Fraction(n, len(different)) for n in range(len(different))]
-            and len({phases.count(phase) for phase in different}) == 1)
+    distinct = sorted(set(phases))
+    return (distinct == [Fraction(n, len(distinct)) for n in range(len(distinct))]
+            and len({phases.count(phase) for phase in distinct}) == 1)
 
 
 @cache
 def symmetry_of(phases: tuple[Fraction, ...], variables: int = 2, each: int = 1) -> Symmetry:
     """Return the symmetry of legs with these phases and one cell, or two antagonists, each."""
-    legs, different = len(phases), len(set(phases))
+    legs, distinct = len(phases), len(set(phases))
     steps: dict[str, Permutation] = {'side': (1, 0, 3, 2), 'girdle': (2, 3, 0, 1)}
     shifts = {'side': phases[1], 'girdle': phases[2]} if legs == 4 else {}
-    if legs != 4 or different > 2:
+    if legs != 4 or distinct > 2:
         # Map each leg to a leg with the next phase.
         waiting = {phase: [leg for leg in range(legs) if phases[leg] == phase] for phase in phases}
-        order = [waiting[Fraction(n % different, different)].pop(0) for n in range(legs)]
+        order = [waiting[Fraction(n % distinct, distinct)].pop(0) for n in range(legs)]
         after = dict(zip(order, order[1:] + order[:1], strict=True))
         steps = {'cycle': tuple(after[leg] for leg in range(legs))}
-        shifts = {'cycle': Fraction(1, different) % 1}
+        shifts = {'cycle': Fraction(1, distinct) % 1}
     if each == 2:
         steps = {name: (*step, *(legs + leg for leg in step)) for name, step in steps.items()}
         steps['antagonist'] = tuple((leg + legs) % (2 * legs) for leg in range(2 * legs))

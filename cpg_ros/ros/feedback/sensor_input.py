@@ -161,7 +161,7 @@ class _Input:
         struct, (offsets, ranges, _) = self.struct, self._kept
         struct.place, struct.count = offsets.ctypes.data, 0 if wrong else offsets.size
         struct.same, struct.ranges = ranges.ctypes.data, len(same)
-        struct.known = ctypes.cast(ctypes.c_char_p(known), ctypes.c_void_p).value
+        struct.sample = ctypes.cast(ctypes.c_char_p(known), ctypes.c_void_p).value
         struct.length, self.monitor.other = length, wrong
         self._unreadable[0] = UNREADABLE if wrong else 0
 

@@ -57,7 +57,7 @@ class SerializedMessages(ctypes.Structure):
 class Counters(ctypes.Structure):
     """The struct ``counters`` of ``tick.c``."""
 
-    _fields_ = _fields((_LONG, 'ticks late dropped worst'), (_INT, 'resuming wanted stopping'))
+    _fields_ = _fields((_LONG, 'ticks late dropped worst'), (_INT, 'resuming attend stopping'))
 
 
 class Output(ctypes.Structure):
@@ -71,7 +71,7 @@ class Input(ctypes.Structure):
     """The struct ``input`` of ``tick.c``."""
 
     _fields_ = _fields((_POINTER, 'subscription'), (Serialized, 'message'),
-                       (_POINTER, 'known same place values stamp news'),
+                       (_POINTER, 'sample same place values stamp news'),
                        (_LONG, 'ranges count depth length'), (_INT, 'stamped unread'))
 
 
@@ -98,7 +98,7 @@ class Simulated(ctypes.Structure):
 class Loop(ctypes.Structure):
     """The struct ``loop`` of ``tick.c``."""
 
-    _fields_ = _fields((_POINTER, 'count asked advance resume what'),
+    _fields_ = _fields((_POINTER, 'count attend advance resume what'),
                        (_LONG, 'deadline period stall stamp behind'),
                        (_POINTER, 'offset clock correct'), (4 * _POINTER, 'outputs'),
                        (_INT, 'due'))

@@ -87,7 +87,7 @@ typedef struct {
     int64_t ticks, late, dropped;  /* how many */
     int64_t worst;                 /* longest delay, ns */
     int32_t resuming;              /* the last tick was left out after a stall */
-    int32_t wanted;                /* set by other threads: Python is to prepare the next tick */
+    int32_t attend;                /* set by other threads: Python is to prepare the next tick */
     int32_t stopping;              /* set by other threads: ticks do not wait for /clock */
 } counters;
 
@@ -106,7 +106,7 @@ typedef struct {
 typedef struct {
     const void *subscription;
     serialized message;        /* the last one taken */
-    const uint8_t *known;      /* one of the same layout */
+    const uint8_t *sample;     /* one of the same layout */
     const int64_t (*same)[2];  /* bytes, from and to, that are the same in all messages */
     const int64_t *place;      /* first byte of each number; below 0 from the end */
     double *values, *stamp;    /* s; NaN for none */
@@ -172,7 +172,7 @@ int read_input(input *in, const uint8_t *data, int64_t length)
     in->unread = in->length < 0 ? length < -in->length : length != in->length;
     for (int64_t k = 0; k < in->ranges && !in->unread; k++) {
         const int64_t from = in->same[k][0];
-        in->unread = memcmp(data + from, in->known + from, (size_t)(in->same[k][1] - from)) != 0;
+        in->unread = memcmp(data + from, in->sample + from, (size_t)(in->same[k][1] - from)) != 0;
     }
     if (in->unread) {
         return 0;
@@ -258,7 +258,7 @@ enum { ATTEND = 1, RESUME, TICK, RESTART, REFUSED };
 
 typedef struct {
     counters *count;
-    const int32_t *asked;              /* set by the pattern if Python is to prepare the next tick */
+    const int32_t *attend;             /* set by the pattern if Python is to prepare the next tick */
     void (*advance)(void *what, double dt);    /* NULL where Python ticks */
     void (*resume)(void *what, double stall);  /* s; NULL where Python does it */
     void *what;
@@ -334,8 +334,8 @@ int tick(loop *l)
 
 static int is_attended(const loop *l)
 {
-    return __atomic_load_n(&l->count->wanted, __ATOMIC_ACQUIRE)
-        || (l->asked && __atomic_load_n(l->asked, __ATOMIC_ACQUIRE));
+    return __atomic_load_n(&l->count->attend, __ATOMIC_ACQUIRE)
+        || (l->attend && __atomic_load_n(l->attend, __ATOMIC_ACQUIRE));
 }
 
 /* Leave out the ticks that a stall has cost, and the one after it: that keeps ticks apart. Where

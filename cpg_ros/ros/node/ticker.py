@@ -273,18 +273,18 @@ class Ticker(TickThread):
 
     def attend(self) -> None:
         """Let ``prepare`` be called before the next tick."""
-        self.count.wanted = 1
+        self.count.attend = 1
 
     def _run(self) -> None:
         self._begin()
         loop, address = self.loop, ctypes.byref(self.loop)
         loop.deadline = 0 if self._clock is not None else time.monotonic_ns()
         while not self._ending.is_set():
-            self.count.wanted, loop.period = 0, round(1e9 / self.rate)
+            self.count.attend, loop.period = 0, round(1e9 / self.rate)
             loop.stall = (round(1e9 * MAX_DELAY) if self._resume is None else
                           STALL_PERIODS * loop.period)
             with self._prepare(loop), self._clock or nullcontext():
-                # Asked again, as wanted may have been set before it is reset above.
+                # Asked again, as attend may have been set before it is reset above.
                 while not self._ending.is_set() and (
                         event := self._library.run(address)) != native.ATTEND:
                     self._handle(event)

@@ -136,11 +136,11 @@ def _compared(args: Namespace, description: RobotDescription) -> RobotCheck:
         if name not in presets:
             raise InputError(f"--gait: '{name}' is not one of "
                              f'{", ".join(dict.fromkeys(presets))}')
-    there = all(joint.name in description.joints and not description.joints[joint.name].undrivable
-                for joint in robot.joints)
+    drivable = all(joint.name in description.joints
+                   and not description.joints[joint.name].undrivable for joint in robot.joints)
     return checked(robot, description, (args.robot or str(args.make), source),
                    list(dict.fromkeys(args.gaits)), args.frequency, args.amplitude,
-                   geometry_from(robot, description) if robot.geometry and there else None)
+                   geometry_from(robot, description) if robot.geometry and drivable else None)
 
 
 def _given(texts: Sequence[str]) -> dict[str, str]:

@@ -149,10 +149,10 @@ class RobotCheck:
             ('joint', 'leg', 'kind', 'limits [rad]', self.format, 'speed [rad/s]',
              self.format, '')]
         for row in self.joints:
-            joint, there = row.joint, row.described
-            rows.append((joint.name, joint.leg, there.kind if there else '-', _span(joint),
-                         _span(there) if there else '-', f'{joint.velocity:.4g}',
-                         _limit(there.velocity) if there else '-',
+            joint, match = row.joint, row.described
+            rows.append((joint.name, joint.leg, match.kind if match else '-', _span(joint),
+                         _span(match) if match else '-', f'{joint.velocity:.4g}',
+                         _limit(match.velocity) if match else '-',
                          'does not match' if row.faults else 'ok'))
         lines = table(rows, '<<<<<>><')
         rows = [('gait', 'network', 'stride [Hz]', 'nearest limit', 'fastest joint', '')]
@@ -201,37 +201,37 @@ def checked(robot: Robot, description: RobotDescription, names: tuple[str, str],
         tuple(shape), tuple(_notes(robot, description)))
 
 
-def walking_faults(robot: Robot, known: RobotDescription,
+def walking_faults(robot: Robot, model: RobotDescription,
                    gaits: Sequence[tuple[str, str]] = ()) -> list[str]:
     """Return why a robot does not stand or walk forward, by forward kinematics.
 
     Args:
         robot: from a robot file.
-        known: the description.
+        model: the description.
         gaits: networks and their presets, of which the first one that goes forward is checked;
             empty for all gaits of the robot's first network.
 
     """
     own = robot.networks[0]
-    faults = list(_misplaced(robot, known))
+    faults = list(_misplaced(robot, model))
     for network, name in gaits or [(own, gait) for gait in NETWORKS[own].gaits()]:
         if NETWORKS[network].presets()[name].gait in FORWARD_GAITS:
             with suppress(PlanError):    # which the gait's own check reports
-                return faults + list(_missteps(robot, known, plan_gait(
+                return faults + list(_missteps(robot, model, plan_gait(
                     unlimited(robot), name, DEFAULT_FREQUENCY, network=network)))
     return faults
 
 
-def _chains(robot: Robot, known: RobotDescription) -> dict[str, LegChain]:
+def _chains(robot: Robot, model: RobotDescription) -> dict[str, LegChain]:
     """Return the legs with joints and foot in the description."""
-    found = {}
+    chains = {}
     for leg, joints in robot.legs.items():
-        if all(joint.name in known.joints and not known.joints[joint.name].undrivable
+        if all(joint.name in model.joints and not model.joints[joint.name].undrivable
                for joint in joints):
-            chain = known.leg(joint.name for joint in joints)
+            chain = model.leg(joint.name for joint in joints)
             if chain.lengths[-1] > 0.0:
-                found[leg] = chain
-    return found
+                chains[leg] = chain
+    return chains
 
 
 def _lopsided(robot: Robot) -> Iterator[str]:
@@ -245,9 +245,9 @@ def _lopsided(robot: Robot) -> Iterator[str]:
                    f'{len(robot.legs[more])}')
 
 
-def _misplaced(robot: Robot, known: RobotDescription) -> Iterator[str]:
+def _misplaced(robot: Robot, model: RobotDescription) -> Iterator[str]:
     """Return which legs are on another side or end than in the file, and which do not stand."""
-    chains, what = _chains(robot, known), known.format
+    chains, what = _chains(robot, model), model.format
     for one, other in combinations(chains, 2):
         x, y, _ = chains[one].anchors[0] - chains[other].anchors[0]
         sides, girdles = ([places.get(leg) for leg in (one, other)]
@@ -266,7 +266,7 @@ def _misplaced(robot: Robot, known: RobotDescription) -> Iterator[str]:
             yield (f'{leg}: in the stand its foot is {high:.3g} m above its lowest joint: its '
                    f"joints' limits, axes or offsets do not let it stand")
         if len(robot.legs) == 2 and len(chain.joints) > 4:
-            up = sole_up(known, chain.joints[-1])
+            up = sole_up(model, chain.joints[-1])
             if (tilt := acos(min(1.0, float((frame @ up)[2])))) > MAX_SOLE_TILT:
                 yield f'{leg}: in the stand its sole is {tilt:.2g} rad off level'
 
@@ -298,7 +298,7 @@ def sole_up(known: RobotDescription, last: str) -> np.ndarray:
     return up if flat(-up) > MIN_TOE_FLATNESS or flat(down) < MIN_FLATNESS else -down
 
 
-def _missteps(robot: Robot, known: RobotDescription, gait: GaitPlan) -> Iterator[str]:
+def _missteps(robot: Robot, model: RobotDescription, gait: GaitPlan) -> Iterator[str]:
     """Return which feet move forward while they are low, or hardly move, in a gait forward."""
     names = [joint.name for joint in robot.joints]
     readout, count = gait.readout, 64
@@ -307,7 +307,7 @@ def _missteps(robot: Robot, known: RobotDescription, gait: GaitPlan) -> Iterator
     angles = {name: offsets[k] + np.interp(
         phases + gait.orbit.phases[robot.cells[k]], np.arange(points) / points,
         readout.angles[k], period=1.0) for k, name in enumerate(names)}
-    for leg, chain in _chains(robot, known).items():
+    for leg, chain in _chains(robot, model).items():
         path = np.array([chain.posed([angles[name][k] for name in chain.joints])[1][-1]
                          for k in range(count)])
         steps = np.roll(path[:, 0], -1) - path[:, 0]
@@ -316,23 +316,23 @@ def _missteps(robot: Robot, known: RobotDescription, gait: GaitPlan) -> Iterator
         stride, lift = float(np.ptp(path[:, 0])), float(np.ptp(path[:, 2]))
         if lift > 0.02 * stride and steps[low].sum() > BACKWARD_FRACTION * stride > 0.0:
             yield (f'{leg}: its foot moves forward while it is low in the {gait.name}, so that '
-                   f'the robot walks backward: are the axes of the {known.format} turned the '
+                   f'the robot walks backward: are the axes of the {model.format} turned the '
                    'other way?')
         elif min(lift, stride) < MIN_MOTION * sum(chain.lengths):
             yield (f'{leg}: its foot moves by {1e3 * stride:.2g} mm forward and '
                    f'{1e3 * lift:.2g} mm upward only in the {gait.name}')
 
 
-def _implausible(robot: Robot, known: RobotDescription) -> Iterator[str]:
+def _implausible(robot: Robot, model: RobotDescription) -> Iterator[str]:
     """Return a line for each implausible length or mass of a description."""
-    legs, what = _chains(robot, known), known.format
+    legs, what = _chains(robot, model), model.format
     longest = max((float(sum(chain.lengths)) for chain in legs.values()), default=0.0)
     for leg, chain in legs.items():
         if sum(chain.lengths) > MAX_LEG_LENGTH:
             k = int(np.argmax(chain.lengths))
             yield (f'{leg}: the link below {chain.joints[k]} is {chain.lengths[k]:.4g} m long in '
                    f'the {what}: are its lengths in mm?')
-    mass = sum(link.mass for link in known.links.values())
+    mass = sum(link.mass for link in model.links.values())
     if legs and mass > 0.0 and 0.0 < longest <= MAX_LEG_LENGTH:
         density = mass / longest**3
         if not DENSITY_RANGE[0] <= density <= DENSITY_RANGE[1]:
@@ -340,12 +340,12 @@ def _implausible(robot: Robot, known: RobotDescription) -> Iterator[str]:
                    'no walking robot has')
 
 
-def _differing(stated: BodyGeometry, found: BodyGeometry, what: str) -> Iterator[str]:
+def _differing(stated: BodyGeometry, match: BodyGeometry, what: str) -> Iterator[str]:
     """Return where a robot file's geometry differs, in lines; ``what`` is the other's format."""
-    if found.mass > 0.0 and not 1.0 / MAX_MASS_RATIO <= stated.mass / found.mass <= MAX_MASS_RATIO:
-        yield f"geometry.mass {stated.mass:.4g} kg is not the {what}'s {found.mass:.4g} kg"
+    if match.mass > 0.0 and not 1.0 / MAX_MASS_RATIO <= stated.mass / match.mass <= MAX_MASS_RATIO:
+        yield f"geometry.mass {stated.mass:.4g} kg is not the {what}'s {match.mass:.4g} kg"
     for leg, own in stated.legs.items():
-        other = found.legs.get(leg)
+        other = match.legs.get(leg)
         if other is not None:
             yield from (f'geometry.legs.{leg}.{fault}' for fault in _leg_faults(own, other, what))
 
@@ -366,25 +366,25 @@ def _leg_faults(own: LegGeometry, other: LegGeometry, what: str) -> Iterator[str
 
 
 def _faults(joint: Joint, description: RobotDescription, near: str) -> Iterator[str]:
-    what, there = description.format, description.joints.get(joint.name)
-    if there is None:
+    what, match = description.format, description.joints.get(joint.name)
+    if match is None:
         yield f'the {what} has no such joint' + (f", did you mean '{near}'?" if near else '')
         return
-    if there.undrivable:
-        yield f'cannot be driven, in the {what} it {there.undrivable}'
+    if match.undrivable:
+        yield f'cannot be driven, in the {what} it {match.undrivable}'
         return
-    if joint.lower < there.lower - LIMIT_TOLERANCE:
-        yield (f'lower limit {joint.lower:g} rad is {there.lower - joint.lower:.4g} rad below the '
-               f"{what}'s {there.lower:g}")
-    if joint.upper > there.upper + LIMIT_TOLERANCE:
-        yield (f'upper limit {joint.upper:g} rad is {joint.upper - there.upper:.4g} rad above the '
-               f"{what}'s {there.upper:g}")
-    if not there.lower - LIMIT_TOLERANCE <= joint.offset <= there.upper + LIMIT_TOLERANCE:
-        yield (f"offset {joint.offset:g} rad is outside the {what}'s limits {there.lower:g} to "
-               f'{there.upper:g}: the robot could not stand')
-    if joint.velocity > there.velocity + LIMIT_TOLERANCE:
-        yield (f'velocity limit {joint.velocity:g} rad/s is {joint.velocity - there.velocity:.4g} '
-               f"rad/s above the {what}'s {there.velocity:g}")
+    if joint.lower < match.lower - LIMIT_TOLERANCE:
+        yield (f'lower limit {joint.lower:g} rad is {match.lower - joint.lower:.4g} rad below the '
+               f"{what}'s {match.lower:g}")
+    if joint.upper > match.upper + LIMIT_TOLERANCE:
+        yield (f'upper limit {joint.upper:g} rad is {joint.upper - match.upper:.4g} rad above the '
+               f"{what}'s {match.upper:g}")
+    if not match.lower - LIMIT_TOLERANCE <= joint.offset <= match.upper + LIMIT_TOLERANCE:
+        yield (f"offset {joint.offset:g} rad is outside the {what}'s limits {match.lower:g} to "
+               f'{match.upper:g}: the robot could not stand')
+    if joint.velocity > match.velocity + LIMIT_TOLERANCE:
+        yield (f'velocity limit {joint.velocity:g} rad/s is {joint.velocity - match.velocity:.4g} '
+               f"rad/s above the {what}'s {match.velocity:g}")
 
 
 def _gait(robot: Robot, description: RobotDescription, network: str, name: str,
@@ -398,11 +398,11 @@ def _gait(robot: Robot, description: RobotDescription, network: str, name: str,
     faults, rooms, fractions = [], [], []
     for joint, low, high, speed in zip(robot.joints, *gait_plan.span, gait_plan.speed,
                                        strict=True):
-        there = description.joints.get(joint.name)
-        if there and not there.undrivable:
-            joint = replace(joint, lower=max(joint.lower, there.lower),
-                            upper=min(joint.upper, there.upper),
-                            velocity=min(joint.velocity, there.velocity))
+        match = description.joints.get(joint.name)
+        if match and not match.undrivable:
+            joint = replace(joint, lower=max(joint.lower, match.lower),
+                            upper=min(joint.upper, match.upper),
+                            velocity=min(joint.velocity, match.velocity))
         low, high = joint.offset + low, joint.offset + high
         rooms.append((min(low - joint.lower, joint.upper - high), joint.name))
         fractions.append((speed / joint.velocity, joint.name))
@@ -425,9 +425,9 @@ def _fastest(motion: Motion) -> float:
 
 def _nearest(robot: Robot, described: RobotDescription) -> dict[str, str]:
     """Return the most similar names in the description for joints that it does not have."""
-    there = {joint.name for joint in robot.joints}
+    names = {joint.name for joint in robot.joints}
     free = {name.lower(): name for name, joint in described.joints.items()
-            if not joint.undrivable and name not in there}
+            if not joint.undrivable and name not in names}
     return {joint.name: free[near] for joint in robot.joints
             for near in get_close_matches(joint.name.lower(), list(free), 1)}
 

@@ -63,11 +63,11 @@ COST_TOLERANCE = 1e-5
 MIN_BEND = 0.03
 
 
-def robot_from(known: RobotDescription, name: str, legs: Legs) -> tuple[Robot, str]:
+def robot_from(model: RobotDescription, name: str, legs: Legs) -> tuple[Robot, str]:
     """Make a first robot from a description; return it and the roles of its joints.
 
     Args:
-        known: the description.
+        model: the description.
         name: of the robot.
         legs: its legs, as of ``legs_in``.
 
@@ -85,25 +85,25 @@ def robot_from(known: RobotDescription, name: str, legs: Legs) -> tuple[Robot, s
     usual = {kind.name: next(iter(kind.legs.items())) for kind in numbered(len(legs))}
     assignment, cells = next(entry for entry in usual.values() if set(entry[1]) == set(legs))
     networks = tuple(name for name, entry in usual.items() if entry == (assignment, cells))
-    standing = {leg: _StandingLeg.of(known, legs, leg) for leg in legs}
+    standing = {leg: _StandingLeg.of(model, legs, leg) for leg in legs}
     # All feet are on one level.
     ground = float(np.mean([leg.ground for leg in standing.values()]))
     joints, notes = {}, []
-    for leg, made in standing.items():
-        angles = made.angles(ground)
-        weights, roles = made.steps(angles, len(legs))
-        by_name = dict(zip(made.chain.joints, zip(angles.tolist(), weights, strict=True),
+    for leg, leg_model in standing.items():
+        angles = leg_model.angles(ground)
+        weights, roles = leg_model.steps(angles, len(legs))
+        by_name = dict(zip(leg_model.chain.joints, zip(angles.tolist(), weights, strict=True),
                            strict=True))
         joints[leg] = tuple(
-            Joint(joint, leg, cells[leg][0], *by_name[joint], *_range(known.joints[joint]),
-                  SPEED if known.joints[joint].velocity == inf else known.joints[joint].velocity,
-                  tuple(key for key in LIMITS if abs(getattr(known.joints[joint], key)) == inf))
+            Joint(joint, leg, cells[leg][0], *by_name[joint], *_range(model.joints[joint]),
+                  SPEED if model.joints[joint].velocity == inf else model.joints[joint].velocity,
+                  tuple(key for key in LIMITS if abs(getattr(model.joints[joint], key)) == inf))
             for joint in legs[leg])
         notes.append(f'{leg}: ' + ', '.join(
-            f'{joint} {role}' for joint, role in zip(made.chain.joints, roles, strict=True)))
+            f'{joint} {role}' for joint, role in zip(leg_model.chain.joints, roles, strict=True)))
     driven = {joint for leg in legs for joint in legs[leg]}
     robot = Robot(name, networks, assignment, NUM_HARMONICS, joints,
-                  tuple(joint for joint in known.joints if joint in driven))
+                  tuple(joint for joint in model.joints if joint in driven))
     return _fitting(robot), '\n'.join([*notes, *([legs.explanation] if legs.explanation else [])])
 
 
@@ -142,10 +142,10 @@ class _StandingLeg:
     biped: bool
 
     @classmethod
-    def of(cls, known: RobotDescription, legs: Legs, leg: str) -> '_StandingLeg':
+    def of(cls, model: RobotDescription, legs: Legs, leg: str) -> '_StandingLeg':
         """Return a leg of a description; errors as of ``robot_from``."""
-        chain = known.leg(legs[leg])
-        low, high = np.array([_range(known.joints[name]) for name in chain.joints]).T
+        chain = model.leg(legs[leg])
+        low, high = np.array([_range(model.joints[name]) for name in chain.joints]).T
         low, high = low + LIMIT_MARGIN * (high - low), high - LIMIT_MARGIN * (high - low)
         axes, points, _ = chain.posed(0.5 * (low + high))
         pairs = [k for k in range(len(axes) - 1) if abs(axes[k] @ axes[k + 1]) > 0.99
@@ -179,7 +179,7 @@ class _StandingLeg:
         hips = range(bend if end == bend + 1 else min(bend, 1))
         top = next((k for k in hips if abs(chain.axes[k, 1]) > 0.7), bend)
         return cls(chain, low, high, bend, top, end,
-                   sole_up(known, chain.joints[-1]) if level else None, aside, biped)
+                   sole_up(model, chain.joints[-1]) if level else None, aside, biped)
 
     @property
     def height(self) -> float:

@@ -55,21 +55,21 @@ MAX_LEG_JOINTS = 6
 
 
 def legs_in(description: RobotDescription, faces_x: bool = False,
-            given: Mapping[str, str] | None = None) -> Legs:
+            texts: Mapping[str, str] | None = None) -> Legs:
     """Find the legs of a robot; the explanation has a line for each part that is held.
 
     Args:
         description: the description.
         faces_x: whether x is forward, whatever names and axes suggest.
-        given: leg -> text in the names of its joints, for all legs; empty to find them.
+        texts: leg -> text in the names of its joints, for all legs; empty to find them.
 
     Raises:
         LegsError: there are no pairs of legs, or names and positions contradict each other.
         DescriptionError: a leg is of a kind that robot files do not have.
 
     """
-    if given:
-        return _cleaned(description, _named(description, given))
+    if texts:
+        return _cleaned(description, _named(description, texts))
     paths = _paths(description)
     facing_x = _assigned(description, paths, 0)
     agrees = facing_x and not _misnamed(facing_x) and all(
@@ -244,22 +244,22 @@ def _contradiction(description: RobotDescription, legs: Mapping[str, Sequence[st
             + ' '.join(f'{leg}={_in_all(joints)}' for leg, joints in legs.items()))
 
 
-def _named(description: RobotDescription, given: Mapping[str, str]) -> dict[str, tuple[str, ...]]:
+def _named(description: RobotDescription, texts: Mapping[str, str]) -> dict[str, tuple[str, ...]]:
     """Return the joints whose names contain the given texts."""
-    if len(given) % 2 or set(given) != set(leg_names(len(given))):
-        raise LegsError(f'--legs: {", ".join(given)} are not the names of two, four or six legs, '
+    if len(texts) % 2 or set(texts) != set(leg_names(len(texts))):
+        raise LegsError(f'--legs: {", ".join(texts)} are not the names of two, four or six legs, '
                         f'which are {", ".join(leg_names(2))}; {", ".join(leg_names(4))}; '
                         f'{", ".join(leg_names(6))}')
     legs = {leg: tuple(sorted((name for name, joint in description.joints.items()
-                               if joint.kind != 'fixed' and given[leg] in name),
+                               if joint.kind != 'fixed' and texts[leg] in name),
                               key=lambda name: len(description.chain(name))))
-            for leg in leg_names(len(given))}
+            for leg in leg_names(len(texts))}
     for leg, names in legs.items():
         if not names:
-            raise LegsError(f"--legs: no joint that moves has '{given[leg]}' in its name ({leg})")
+            raise LegsError(f"--legs: no joint that moves has '{texts[leg]}' in its name ({leg})")
         others = [other for other in legs if other != leg and set(names) & set(legs[other])]
         if others:
-            raise LegsError(f"--legs: '{given[leg]}' is in names of {leg} and of {others[0]}")
+            raise LegsError(f"--legs: '{texts[leg]}' is in names of {leg} and of {others[0]}")
     return legs
 
 
@@ -270,9 +270,9 @@ def _cleaned(description: RobotDescription, legs: Mapping[str, Sequence[str]]) -
     for pair in zip(names[::2], names[1::2], strict=True):
         why = {(leg, k): reason for leg in pair for k, joint in enumerate(legs[leg])
                if (reason := _held(description, legs[leg], joint))}
-        alike = len(legs[pair[0]]) == len(legs[pair[1]])
+        same_size = len(legs[pair[0]]) == len(legs[pair[1]])
         for leg in pair:
-            out = {k for other, k in why if alike or other == leg}
+            out = {k for other, k in why if same_size or other == leg}
             for k in sorted(out):
                 reason = why.get((leg, k)) or f'is the pair of {legs[pair[leg == pair[0]]][k]}'
                 notes.append(f'{leg}: {legs[leg][k]} {reason}, and is held')

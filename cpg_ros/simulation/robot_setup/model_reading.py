@@ -47,11 +47,11 @@ def load_description(name: str) -> RobotDescription:
     return load_urdf(path) if path.suffix.lower() == '.urdf' else load_mjcf(name)
 
 
-def geometry_from(robot: Robot, known: RobotDescription) -> BodyGeometry:
+def geometry_from(robot: Robot, model: RobotDescription) -> BodyGeometry:
     """Return a robot's geometry, with those of its legs that feedback can displace."""
     return body_geometry(
-        sum(link.mass for link in known.links.values()),
-        {leg: known.leg(joint.name for joint in joints) for leg, joints in robot.legs.items()},
+        sum(link.mass for link in model.links.values()),
+        {leg: model.leg(joint.name for joint in joints) for leg, joints in robot.legs.items()},
         {joint.name: joint.offset for joint in robot.joints})
 
 
@@ -92,7 +92,7 @@ def _described(mujoco: Any, model: Any) -> RobotDescription:
     axes = data.xmat[base].reshape(3, 3)
     # The link of each body, and where its frame is.
     links, origins = {0: 'world'}, {'world': data.xpos[base]}
-    found: dict[str, JointDescription] = {}
+    joints: dict[str, JointDescription] = {}
     for body in range(1, model.nbody):
         link = links[int(model.body_parentid[body])]
         for k in range(model.body_jntadr[body], model.body_jntadr[body] + model.body_jntnum[body]):
@@ -105,7 +105,7 @@ def _described(mujoco: Any, model: Any) -> RobotDescription:
             bounded = max(abs(lower), abs(upper)) < math.inf
             kind = {kinds.mjJNT_HINGE: 'revolute' if bounded else 'continuous',
                     kinds.mjJNT_SLIDE: 'prismatic'}.get(kinds(model.jnt_type[k]), 'ball')
-            found[name] = JointDescription(
+            joints[name] = JointDescription(
                 name, kind, lower, upper, velocity, '', link, f'{name} link',
                 tuple(((data.xanchor[k] - origins[link]) @ axes).tolist()),
                 axis=tuple((data.xaxis[k] @ axes).tolist()))
@@ -115,9 +115,9 @@ def _described(mujoco: Any, model: Any) -> RobotDescription:
     for equation in np.flatnonzero(model.eq_type == mujoco.mjtEq.mjEQ_JOINT):
         follower, leader = model.eq_obj1id[equation], model.eq_obj2id[equation]
         name = model.joint(follower).name
-        if name in found and leader >= 0:
-            found[name] = replace(found[name], mimic=model.joint(leader).name)
-    return RobotDescription('MJCF', found, {
+        if name in joints and leader >= 0:
+            joints[name] = replace(joints[name], mimic=model.joint(leader).name)
+    return RobotDescription('MJCF', joints, {
         link: _link(model, data, [body for body in links if links[body] == link], place, axes)
         for link, place in origins.items()})
 

@@ -167,10 +167,10 @@ def read_walk(path: str | Path, robot: Robot, topics: Mapping[str, str]) -> Walk
         kinds = {connection.topic: connection.msgtype for connection in bag.connections}
         dogs = [topic for topic, kind in kinds.items() if kind == LOW_STATE]
         if dogs and kinds.get(names['joint_states']) != TOPIC_TYPES['joint_states']:
-            given, counts = names['joint_states'], bag.expected()
+            topic_names, counts = names['joint_states'], bag.expected()
             return _of_low_states(path, robot, [
                 (received, data) for _, received, data in bag.messages(
-                    [given if given in dogs else max(dogs, key=counts.__getitem__)])])
+                    [topic_names if topic_names in dogs else max(dogs, key=counts.__getitem__)])])
         for key, topic in list(names.items()):
             if key in OPTIONAL and topic not in kinds:
                 del names[key]

@@ -214,8 +214,8 @@ def evaluate_feedback(robot: Robot, model: str, gaits: Sequence[str], kp: float 
               for gait, trial in trials.items()}
     first: list[Benefit] = []
     for without in LAWS_OFF:
-        tried = replace(own, enabled=True, laws={**own.laws, **dict.fromkeys(without, False)})
-        gains, benefits = robot_gains(replace(robot, feedback=tried)), []
+        variant = replace(own, enabled=True, laws={**own.laws, **dict.fromkeys(without, False)})
+        gains, benefits = robot_gains(replace(robot, feedback=variant)), []
         for gait, trial in trials.items():
             fell = trial.fell(gains)
             calm = Survivors.of(np.isinf(before[gait][0]), np.isinf(fell))
@@ -226,7 +226,7 @@ def evaluate_feedback(robot: Robot, model: str, gaits: Sequence[str], kp: float 
             if not benefits[-1].helps:
                 break
         else:
-            return replace(robot, feedback=replace(tried, made=_text(benefits))), benefits
+            return replace(robot, feedback=replace(variant, made=_text(benefits))), benefits
         first = first or benefits
     return replace(robot, feedback=replace(own, enabled=False, made=_text(first))), first
 
@@ -386,7 +386,7 @@ def tune_feedback(robot: Robot, model: str, gaits: Sequence[str], evaluations: i
     def changed(logs: np.ndarray) -> Gains:
         return before._replace(**scaled_gains(before, names, logs, GAINS))
 
-    result, tried = cma_search(np.zeros(len(names)), INITIAL_SIGMA, (-most, most), seed,
+    result, count = cma_search(np.zeros(len(names)), INITIAL_SIGMA, (-most, most), seed,
                                lambda points, draw: price([*map(changed, points)], draw),
                                evaluations, update, len(starts))
     after = changed(result.xfavorite)
@@ -397,7 +397,7 @@ def tune_feedback(robot: Robot, model: str, gaits: Sequence[str], evaluations: i
     robot, _ = evaluate_feedback(replace(robot, feedback=own), model, gaits, kp, kd, seed)
     judged = robot.feedback or own
     return replace(robot, feedback=replace(
-        judged, made=f'tune --feedback, {", ".join(gaits)}, seed {seed}, {tried} sets of gains; '
+        judged, made=f'tune --feedback, {", ".join(gaits)}, seed {seed}, {count} sets of gains; '
         f'{benefits}; {judged.made}')), benefits
 
 

@@ -67,7 +67,7 @@ def test_strides_and_strokes_are_those_that_were_walked(seed, sign):
     recording.positions[:, 3] *= sign
     for one in found_in(recording):
         downs, duties = truth[one.leg]
-        assert not one.why and one.joint == f'{one.leg}_hip' and len(one.begins) >= 10
+        assert not one.reason and one.joint == f'{one.leg}_hip' and len(one.begins) >= 10
         at = np.argmin(np.abs(downs[:, None] - one.begins), axis=0)
         # Two samples are 0.01 s.
         assert one.begins == pytest.approx(downs[at], abs=0.01)
@@ -103,10 +103,10 @@ def test_what_nothing_tells_is_not_told():
             joints=tuple(some), times=recording.times, source='walk',
             positions=recording.positions[:, [recording.joints.index(name) for name in some]])
         for one in found_in(recording_of, legs):
-            assert one.why.endswith(why)
+            assert one.reason.endswith(why)
             assert np.isnan(one.retractions).all() and len(one.periods) >= 10
     # Whatever angle counts as 0, a knee bends far for a short time; one that moves evenly may not.
     recording.positions[:, [1, 3]] -= 0.8
-    assert not any(one.why for one in found_in(recording))
+    assert not any(one.reason for one in found_in(recording))
     recording.positions[:, [1, 3]] = 0.2 * np.sin(2.0 * np.pi * recording.times / 0.9)[:, None]
-    assert all('bends is unknown' in one.why for one in found_in(recording))
+    assert all('bends is unknown' in one.reason for one in found_in(recording))

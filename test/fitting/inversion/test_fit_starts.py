@@ -56,7 +56,7 @@ def test_starts_are_kept_with_their_way():
                  [{'c': 6.1}, {'tau': 0.2}, {'c': 7.2, 'tau': 0.5}], done=told.append)
     assert told[0] == 0.0 and told[-1] == 1.0 and told == sorted(told) and len(told) > 3
     first, lost, last = fit.starts
-    assert "below the trot's critical delay" in lost.why and lost.cost == np.inf
+    assert "below the trot's critical delay" in lost.reason and lost.cost == np.inf
     assert not len(lost.path) and lost.iterations == 0
     for trial, start in ((first, (6.1, 0.4)), (last, (7.2, 0.5))):
         assert trial.path[0, 1:3] == pytest.approx(start)

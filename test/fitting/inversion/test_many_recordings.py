@@ -26,7 +26,7 @@ import time
 from bags import walk, write_bag
 from cpg_ros.common.errors import InputError
 from cpg_ros.fitting.inversion.many_recordings import FitSettings, Folders
-from cpg_ros.fitting.inversion.results import digest, found
+from cpg_ros.fitting.inversion.results import digest, recordings_in
 import numpy as np
 import pytest
 
@@ -141,7 +141,7 @@ def test_recordings_are_found_split_bags_as_one_and_results_not_at_all(tmp_path)
     (tmp_path / 'd').mkdir()
     (tmp_path / 'd' / 'cpg_ros_results.json').write_text('{}')
     (tmp_path / 'd' / 'table.csv').write_text('')
-    names = [str(one.relative_to(tmp_path)) for one in found([tmp_path, tmp_path / 'a'])]
+    names = [str(one.relative_to(tmp_path)) for one in recordings_in([tmp_path, tmp_path / 'a'])]
     assert names == ['a/bag', 'b', 'c/ik.mot', 'c/monday.mcap', 'c/run.csv.gz', 'c/tuesday.mcap',
                      'c/walk.csv']
     assert digest(tmp_path / 'c' / 'monday.mcap') == digest(tmp_path / 'c' / 'tuesday.mcap')

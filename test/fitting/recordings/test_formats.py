@@ -22,7 +22,7 @@ from bags import storage_file, walk, write_bag
 import cpg_ros
 from cpg_ros.common.errors import InputError
 from cpg_ros.fitting.inversion.inversion import main
-from cpg_ros.fitting.inversion.results import found
+from cpg_ros.fitting.inversion.results import recordings_in
 from cpg_ros.fitting.recordings.formats import FORMATS
 from cpg_ros.fitting.recordings.recording import (
     JOINTS,
@@ -48,8 +48,8 @@ def bag(tmp_path):
 
 
 def test_the_path_decides(table, bag, tmp_path):
-    found = cpg_ros.read_recording(table, progress=False)
-    assert found.positions == pytest.approx(np.array([[np.pi, 1.0], [np.pi / 2, 2.0]]))
+    recordings_in = cpg_ros.read_recording(table, progress=False)
+    assert recordings_in.positions == pytest.approx(np.array([[np.pi, 1.0], [np.pi / 2, 2.0]]))
     whole, file = (cpg_ros.read_recording(path, progress=False)
                    for path in (bag, storage_file(bag)))
     assert whole.joints == file.joints and np.array_equal(whole.positions, file.positions)
@@ -61,11 +61,11 @@ def test_the_path_decides(table, bag, tmp_path):
 
 
 def test_options_go_to_the_reader_or_are_refused(table, bag):
-    found = cpg_ros.read_recording(table, unit='deg', joints=['knee'], progress=False)
-    assert found.joints == ('knee',)
-    assert found.positions[0, 0] == pytest.approx(np.radians(1.0))
-    found = cpg_ros.read_recording(bag, robot_joints=['lh_hip', 'tail'], progress=False)
-    assert found.joints == ('lh_hip',)
+    recordings_in = cpg_ros.read_recording(table, unit='deg', joints=['knee'], progress=False)
+    assert recordings_in.joints == ('knee',)
+    assert recordings_in.positions[0, 0] == pytest.approx(np.radians(1.0))
+    recordings_in = cpg_ros.read_recording(bag, robot_joints=['lh_hip', 'tail'], progress=False)
+    assert recordings_in.joints == ('lh_hip',)
     for path, option, words in ((table, {'topics': ['/a']}, 'topics: a CSV file has none'),
                                 (bag, {'unit': 'deg'}, 'unit: joint states are in rad'),
                                 (bag, {'colour': 'red'}, 'colour: bag recordings have none')):
@@ -106,7 +106,7 @@ def steps(monkeypatch, tmp_path):
 
 def test_a_format_of_ones_own_is_read_by_the_tool_and_found_in_folders(steps, bag, capsys):
     assert cpg_ros.read_recording(steps, rate=100.0).times[1] == pytest.approx(0.01)
-    assert list(found([steps.parent])) == [bag, steps]
+    assert list(recordings_in([steps.parent])) == [bag, steps]
     assert main(['--steps', str(steps), '--order', '1', '--free', 'tau', '--json']) == 0
     fitted = json.loads(capsys.readouterr().out)
     assert fitted['gait'] == 'trot' and fitted['frequency'] == pytest.approx(1.5, rel=1e-3)

@@ -273,8 +273,8 @@ class Sensors:
 CHECK_MODE, RELEASE_MODE, STAND_DOWN = 1001, 1003, 1005
 #: RESPONSE_TIMEOUT: of a request, s; RELEASE_TIMEOUT: of the release of all modes, s.
 RESPONSE_TIMEOUT, RELEASE_TIMEOUT = 3.0, 30.0
-#: LIE_DOWN_TIME: of the robot, s; SETTLING_TIME: after the release of a mode, s.
-LIE_DOWN_TIME, SETTLING_TIME = 4.0, 1.0
+#: LIE_DOWN_TIME: of the robot, s; RELEASE_TIME: after the release of a mode, s.
+LIE_DOWN_TIME, RELEASE_TIME = 4.0, 1.0
 
 
 class RobotService:
@@ -344,7 +344,7 @@ def release(node: Node, lies: bool, wait: Wait, log: Callable[[str], None]) -> N
             wait(LIE_DOWN_TIME)
         log(f"its motion mode '{name}' is to be released")
         switcher.call(RELEASE_MODE)
-        wait(SETTLING_TIME)
+        wait(RELEASE_TIME)
     log('no motion mode of its own is active')
 
 
