@@ -115,10 +115,10 @@ class Between(Watcher):
 
 
 @pytest.fixture
-def between():
+def between(request):
     # In turns, so that a slow machine makes a slow robot.
     body = Process('-p', 'real_time_factor:=0.0', '-p', 'rate:=250.0',
-                   executable=EXECUTABLE.with_name('robot_sim'))
+                   *getattr(request, 'param', ()), executable=EXECUTABLE.with_name('robot_sim'))
     found = Between(body.domain)
     # On by default, as the robot is calibrated and the topic of its joints is its own.
     generator = Process('-r', '/clock:=relay/clock', '-p', 'use_sim_time:=true', '-p',
@@ -128,6 +128,20 @@ def between():
     yield body, found, generator
     for one in (generator, found, body):
         one.end()
+
+
+@pytest.mark.parametrize('between', [('-p', 'kp:=36.0', '-p', 'kd:=3.0')], indirect=True)
+def test_the_gains_of_the_servos_are_found_by_their_efforts(between):
+    _, watcher, generator = between
+    generator.wait_for('publishing')
+    until(watcher.corrected, 'feedback')
+    watcher.pass_by(6.0)
+    watcher.diagnostics.clear()
+    until(lambda: watcher.health, 'diagnostics')
+    values = {one.key: one.value for one in watcher.health.values}
+    found = [float(part) for part in values['kp, kd of the servos / expected'].split(', ')]
+    np.testing.assert_allclose(found, (0.6, 1.5), rtol=0.1)
+    assert watcher.rows[-1][2] > 0.2
 
 
 def test_the_closed_go2_walks_and_an_input_that_fails_is_named(between):
