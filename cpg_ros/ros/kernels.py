@@ -71,7 +71,7 @@ class StartProgress:
 
 #: Durations of compilation on one core of 2023, s. FEEDBACK_TIME: the kernels of the feedback;
 #: BALANCE_TIME: those of a biped's balance; NETWORK_TIME: a network in C.
-FEEDBACK_TIME, BALANCE_TIME, NETWORK_TIME = 25.0, 40.0, 2.0
+FEEDBACK_TIME, BALANCE_TIME, NETWORK_TIME = 35.0, 40.0, 2.0
 #: How often it is seen whether a compiling process has ended, s.
 POLL_PERIOD = 0.05
 

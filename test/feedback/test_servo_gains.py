@@ -49,10 +49,10 @@ def test_ratios_and_delay_are_found(loop, late):
     walk = ClosedLoop(loop, [Scenario(kp=kp, kd=kd) for kp, kd in RATIOS], GAINS, None,
                       SensorNoise(late))
     walk.go(round(4.5 / DT))
-    found = walk.servos.found
+    found = walk.servos.estimated
     np.testing.assert_allclose(found[:, :2], RATIOS, rtol=0.1)
     np.testing.assert_allclose(found[:, 2], late, atol=DT)
-    np.testing.assert_allclose(walk.servos.used[:, :2], np.where(np.equal(RATIOS, 1.0), 1.0,
+    np.testing.assert_allclose(walk.servos.applied[:, :2], np.where(np.equal(RATIOS, 1.0), 1.0,
                                                           found[:, :2]))
 
 
@@ -115,7 +115,7 @@ def test_no_target_jumps_nor_leaves_its_limits_by_an_estimate():
         assert np.abs(shift - last).max() < 0.06 and np.abs(shift).max() <= 0.5
         assert np.abs(sent).max() <= 1.0
         last = shift
-    used = robot.servos.used[0]
+    used = robot.servos.applied[0]
     assert used[0] == pytest.approx(0.42, rel=0.01)
 
 
@@ -132,7 +132,7 @@ def test_joints_at_rest_and_old_measurements_tell_nothing():
     for how in ({'amplitude': 0.0}, {'fresh': False}):
         for _ in range(round(3.0 / DT)):
             robot.tick(**how)
-    assert robot.servos.common[0, 3] == 0.0 and (robot.servos.used[0, :2] == 1.0).all()
+    assert robot.servos.common[0, 3] == 0.0 and (robot.servos.applied[0, :2] == 1.0).all()
 
 
 def test_it_lets_go_as_all_feedback_does():

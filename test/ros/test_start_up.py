@@ -261,7 +261,7 @@ def test_a_first_start_announces_what_it_compiles_before_it_does(tmp_path):
                         environment={'NUMBA_CACHE_DIR': str(tmp_path)})
     watcher = Watcher(generator.domain)
     try:
-        generator.wait_for('compiling the feedback: about 25 s, only at its first start')
+        generator.wait_for('compiling the feedback: about 35 s, only at its first start')
         assert 'compiled in' not in generator.log
         # And says so once a second to whoever looks.
         until(lambda: any(status.name == '/cpg_generator: start' and status.message.startswith(

@@ -17,8 +17,8 @@
 A servo with the gains kp' and kd' turns its joint, at q, by tau = kp' (theta - q) - kd' dq/dt.
 From measured torques tau, least squares with forgetting (Ljung and Soderstrom 1983) finds the
 ratios kp'/kp and kd'/kd to the gains that the gaits were made for, the same for all joints. It
-tries the targets sent 0 to MAX_LAG s earlier; the lag with the least residual is the time from
-sending a target to measuring its effect. The target
+tries the targets sent 0 to MAX_LAG s, and fewer than NUM_LAGS ticks, earlier; the lag with the
+least residual is the time from sending a target to measuring its effect. The target
 theta' = q + (kp (theta - q) + (kd' - kd) dq/dt) / kp',
 with q extrapolated over the lag, makes the torque that the gait expects.
 """
@@ -38,7 +38,7 @@ LAW = Law(
                          'made for, in N m/rad; 0 for unknown, which switches servo_gains off'),
         'servo_kd': Gain(0.0, 1000.0, '', 'their damping gain, in N m s/rad; likewise')})
 
-#: NUM_LAGS, MAX_LAG: largest delay of a target's effect, ticks and s.
+#: NUM_LAGS, MAX_LAG: delays of a target's effect are below NUM_LAGS ticks, and at most MAX_LAG, s.
 NUM_LAGS, MAX_LAG = 32, 0.03
 #: MEMORY: time constant of the forgetting, s; MIN_TIME: time of motion that is needed, s;
 #: MIN_SPEED: RMS speed of the joints, rad/s, from which on they tell the gains.
@@ -46,7 +46,7 @@ MEMORY, MIN_TIME, MIN_SPEED = 2.0, 1.0, 0.5
 #: MAX_RESIDUAL: fraction of the torques' mean square that may stay unexplained; MIN_INDEPENDENCE:
 #: least determinant, as a fraction of the diagonal's product.
 MAX_RESIDUAL, MIN_INDEPENDENCE = 0.04, 0.05
-#: LOWEST, HIGHEST: ratios that are believed. HOLD_TIME: for how long ratios stay in use, s, when
+#: LOWEST, HIGHEST: ratios that are accepted. HOLD_TIME: for how long ratios stay in use, s, when
 #: measurements contradict them, as those of a push do, in which torques reach the motors' limits.
 LOWEST, HIGHEST, HOLD_TIME = 0.4, 2.5, 5.0
 #: Logarithms of ratios, either way. NEAR: that of a ratio up to which gains count as right; FAR:
@@ -69,10 +69,10 @@ class ServoEstimate(NamedTuple):
         sums: of each lag, of e^2, e w and e tau with e = kp (theta - q) and w = -kd dq/dt, shape
             (runs, NUM_LAGS, 3).
         common: sums of w^2, w tau and tau^2, and the time that they last, s, shape (runs, 4).
-        found: ratios of kp and kd, lag in s, and fraction of the torques' mean square that is not
-            explained, shape (runs, 4).
-        used: ratios of kp and kd and lag in s that are in use, and for how long none were
-            believed, s, shape (runs, 4).
+        estimated: ratios of kp and kd, lag in s, and fraction of the torques' mean square that
+            is not explained, shape (runs, 4).
+        applied: ratios of kp and kd and lag in s that act, and for how long none were valid, s,
+            shape (runs, 4).
 
     """
 
@@ -81,8 +81,8 @@ class ServoEstimate(NamedTuple):
     newest: np.ndarray
     sums: np.ndarray
     common: np.ndarray
-    found: np.ndarray
-    used: np.ndarray
+    estimated: np.ndarray
+    applied: np.ndarray
 
     @classmethod
     def begin(cls, runs: int, joints: int) -> 'ServoEstimate':
@@ -97,8 +97,8 @@ class ServoEstimate(NamedTuple):
         """Forget everything."""
         self.newest[0] = -1
         self.sums[:] = self.common[:] = 0.0
-        self.found[:] = 1.0
-        self.used[:] = 1.0, 1.0, 0.0, 0.0
+        self.estimated[:] = 1.0
+        self.applied[:] = 1.0, 1.0, 0.0, 0.0
 
 
 @jit
@@ -116,7 +116,7 @@ def _solve(sums, common):
 @jit
 def _learn(servos, run, angles, rates, efforts, expected, dt):
     """Take new measurements of a run, dt in s after the last ones, shape (joints,) or more."""
-    common, found, newest = servos.common[run], servos.found[run], servos.newest[0]
+    common, estimated, newest = servos.common[run], servos.estimated[run], servos.newest[0]
     joints, speed, total = servos.targets.shape[2], 0.0, 0.0
     for k in range(joints):
         speed += rates[k]**2
@@ -146,12 +146,12 @@ def _learn(servos, run, angles, rates, efforts, expected, dt):
         kp_ratio, kd_ratio, residual = _solve(sums, common)
         if residual < least:
             least = residual
-            found[0], found[1], found[2] = kp_ratio, kd_ratio, lag * dt
-            found[3] = residual / max(common[2], 1e-9)
+            estimated[0], estimated[1], estimated[2] = kp_ratio, kd_ratio, lag * dt
+            estimated[3] = residual / max(common[2], 1e-9)
 
 
 @jit
-def _wanted(ratio):
+def _target(ratio):
     """Return a ratio if it differs much from 1, 1 if it differs little, between in between."""
     share = min(max((abs(math.log(ratio)) - NEAR) / (FAR - NEAR), 0.0), 1.0)
     return ratio**share if share > 0.0 else 1.0
@@ -159,23 +159,23 @@ def _wanted(ratio):
 
 @jit
 def _use(servos, run, dt):
-    """Let the ratios in use approach those that are found, if they are believed."""
-    found, used = servos.found[run], servos.used[run]
-    believed = (servos.common[run, 3] >= MIN_TIME and found[3] < MAX_RESIDUAL
-                and LOWEST <= found[0] <= HIGHEST and LOWEST <= found[1] <= HIGHEST)
-    used[3] = 0.0 if believed else used[3] + dt
-    if 0.0 < used[3] < HOLD_TIME:
+    """Let the applied ratios approach the estimated ones, if these are valid."""
+    estimated, applied = servos.estimated[run], servos.applied[run]
+    valid = (servos.common[run, 3] >= MIN_TIME and estimated[3] < MAX_RESIDUAL
+             and LOWEST <= estimated[0] <= HIGHEST and LOWEST <= estimated[1] <= HIGHEST)
+    applied[3] = 0.0 if valid else applied[3] + dt
+    if 0.0 < applied[3] < HOLD_TIME:
         return
-    if believed:
-        used[2] += limited(found[2] - used[2], dt * MAX_LAG / DOUBLING_TIME)
+    if valid:
+        applied[2] += limited(estimated[2] - applied[2], dt * MAX_LAG / DOUBLING_TIME)
     for k in range(2):
-        wanted = _wanted(found[k]) if believed else 1.0
-        used[k] *= math.exp(limited(math.log(wanted / used[k]),
+        target = _target(estimated[k]) if valid else 1.0
+        applied[k] *= math.exp(limited(math.log(target / applied[k]),
                                     dt * math.log(2.0) / DOUBLING_TIME))
 
 
 @jit_entry
-def restore(targets, measured, servos, asked, expected, limits, instant):
+def restore(targets, measured, servos, stiffness, expected, limits, instant):
     """Shift targets so that servos make the expected torques, in place.
 
     Args:
@@ -183,7 +183,7 @@ def restore(targets, measured, servos, asked, expected, limits, instant):
         measured: angles in rad, speeds in rad/s and torques in N m of the joints, shape (runs,
             joints) or more each.
         servos: ServoEstimate, changed in place.
-        asked: factor of kp, and for how long servos stay stiff after a push, s, each of shape
+        stiffness: factor of kp, and for how long servos stay stiff after a push, s, each of shape
             (runs,).
         expected: servo_kp and servo_kd.
         limits: lowest and highest angles, rad, and largest speeds, rad/s, shape (3, joints) or
@@ -201,18 +201,19 @@ def restore(targets, measured, servos, asked, expected, limits, instant):
     row = (newest + 1) % NUM_LAGS
     for run in range(targets.shape[0]):
         # After a push, torques reach the motors' limits.
-        if fresh and asked[1][run] == 0.0:
+        if fresh and stiffness[1][run] == 0.0:
             _learn(servos, run, angles[run], rates[run], efforts[run], expected, dt)
         _use(servos, run, dt)
-        before, used = servos.targets[run, newest], servos.used[run]
-        kp_ratio, kd_ratio = used[0], used[1]
+        before, applied = servos.targets[run, newest], servos.applied[run]
+        kp_ratio, kd_ratio = applied[0], applied[1]
         if kp_ratio != 1.0 or kd_ratio != 1.0:
-            more = (kd_ratio - 1.0) * expected[1] / (kp_ratio * asked[0][run] * expected[0])
+            by_rate = (kd_ratio - 1.0) * expected[1] / (kp_ratio * stiffness[0][run] * expected[0])
             for k in range(targets.shape[1]):
-                angle = angles[run, k] + used[2] * rates[run, k]
-                shift = (1.0 / kp_ratio - 1.0) * (targets[run, k] - angle) + more * rates[run, k]
+                angle = angles[run, k] + applied[2] * rates[run, k]
+                shift = ((1.0 / kp_ratio - 1.0) * (targets[run, k] - angle)
+                         + by_rate * rates[run, k])
                 angle = targets[run, k] + limited(fraction * shift, MAX_SHIFT)
                 angle = before[k] + limited(angle - before[k], limits[2, k] * dt + MAX_STEP)
                 targets[run, k] = min(max(angle, limits[0, k]), limits[1, k])
-        servos.targets[run, row], servos.scales[run, row] = targets[run], asked[0][run]
+        servos.targets[run, row], servos.scales[run, row] = targets[run], stiffness[0][run]
     servos.newest[0] = row

@@ -82,9 +82,9 @@ def findings(free: Sequence[Free], estimates: Mapping[str, Estimate], spread: Sp
     if model.size > 0.0:
         bounded = [name for name, estimate in estimates.items() if estimate.bounded]
         unknown = [name for name in estimates if name not in bounded]
-        clauses = [f'the intervals of {_quote(bounded)} allow for this'] if bounded else []
+        clauses = [f'the intervals of {_join_names(bounded)} allow for this'] if bounded else []
         if unknown:
-            clauses.append(f'{_quote(unknown)}: cannot tell')
+            clauses.append(f'{_join_names(unknown)}: cannot tell')
         lines.append((
             f'the model does not fit the recording: the residual is {times:.3g} times the noise, '
             f'as with waveforms that are wrong by {100.0 * model.size:.2g} %; '
@@ -100,7 +100,7 @@ def findings(free: Sequence[Free], estimates: Mapping[str, Estimate], spread: Sp
             moves = moves / np.abs(moves).max()
             ways = ', '.join(f'{estimate.name} by {move:+.3g}' for estimate, move
                              in zip(free, moves, strict=True) if estimate.name in blind)
-            lines.append(f'{_quote(blind)} are not determined one by one: changing {ways} '
+            lines.append(f'{_join_names(blind)} are not determined one by one: changing {ways} '
                          'does not affect the recorded motion')
     for k, (name, estimate) in enumerate(estimates.items()):
         room = BOUND_TOLERANCE * (free[k].high - free[k].low)
@@ -129,7 +129,7 @@ def findings(free: Sequence[Free], estimates: Mapping[str, Estimate], spread: Sp
     return lines
 
 
-def _quote(names: Sequence[str]) -> str:
+def _join_names(names: Sequence[str]) -> str:
     return ' and '.join(filter(None, [', '.join(names[:-1]), names[-1]]))
 
 

@@ -252,7 +252,7 @@ class FeedbackLoop(SensorLoop):
     @property
     def servo_ratios(self) -> np.ndarray:
         """Ratios of the servos' kp and kd to servo_kp and servo_kd, in use, shape (2,)."""
-        return self._data.servos.used[0, :2]
+        return self._data.servos.applied[0, :2]
 
     @property
     def fraction_array(self) -> np.ndarray:
