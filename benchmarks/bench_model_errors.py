@@ -220,7 +220,7 @@ def main() -> int:
     parser.add_argument('--impulses', type=float, nargs='+', default=[30.0, 40.0], metavar='NS',
                         help='of the pushes, N s (default: 30 40)')
     parser.add_argument('--rows', nargs='+', default=list(ROWS), choices=list(ROWS),
-                        metavar='ROW', help='; '.join(ROWS))
+                        metavar='ROW', help='; '.join(ROWS).replace('%', '%%'))
     parser.add_argument('--late', type=float, default=0.0, metavar='MS',
                         help='delay of all sensors (default: %(default)g)')
     parser.add_argument('--without', action='store_true', help='without the law servo_gains')

@@ -93,6 +93,7 @@ class Intent(NamedTuple):
 
     Attributes:
         alternates: 1 where left and right legs alternate, 0 where they hop.
+        singly: 1 where legs swing one by one, 0 where two or more swing at a time.
         roll, pitch: deviation from the slope of the ground, rad.
         uphill: displacement of all feet, m, a pair.
         further: how much further to put feet down, m, a pair.
@@ -105,6 +106,7 @@ class Intent(NamedTuple):
     """
 
     alternates: float
+    singly: float
     roll: float
     pitch: float
     uphill: tuple[float, float]
@@ -212,10 +214,11 @@ def _intend(tables, gains, memory, planned, run, off, step):
     ground = memory.ground_angles[run]
     ground[0] = low_passed(ground[0], off.roll, gains.slope_filter, dt)
     ground[1] = low_passed(ground[1], off.pitch, gains.slope_filter, dt)
+    singly = tables.one_by_one[old] + mix * (tables.one_by_one[new] - tables.one_by_one[old])
     uphill_x = uphill_y = 0.0
     if gains.slope:
-        singly = tables.one_by_one[old] + mix * (tables.one_by_one[new] - tables.one_by_one[old])
-        uphill_x = alternates * slope.shift_ahead(ground[1], singly, gains)
+        uphill_x = alternates * slope.shift_ahead(
+            ground[1], singly, memory.clearance_share[run], gains)
         uphill_y = -alternates * slope.shift(ground[0], gains.slope_share, gains)
     # A foot passes below the body in the duration of a stance.
     stance = tables.stance[old] + mix * (tables.stance[new] - tables.stance[old])
@@ -234,7 +237,7 @@ def _intend(tables, gains, memory, planned, run, off, step):
         fraction * dt)
     strode = (phase - memory.last_phase[run] + 0.5) % 1.0 - 0.5
     memory.last_phase[run] = phase
-    return slot, Intent(alternates, off.roll - ground[0], off.pitch - ground[1],
+    return slot, Intent(alternates, singly, off.roll - ground[0], off.pitch - ground[1],
                         (uphill_x, uphill_y), further, yielded,
                         left + memory.sidestep_correction[run], strode,
                         _stiffness(tables, planned, run, memory.wanted_velocity[run, 0, 0]),
@@ -269,7 +272,7 @@ def _displacement(tables, gains, memory, at, foot, middle, off, intent, dt):
             # About the middle of the feet that stand: the body is tilted, not raised. Its
             # torque goes with the servos' stiffness.
             z = posture.in_stance(foot[0] - middle[0], foot[1] - middle[1], off.roll, off.pitch,
-                                  off.wx, off.wy, gains) / intent.stiffness
+                                  off.wx, off.wy, intent.singly, gains) / intent.stiffness
     if gains.placement:
         placed = memory.placement_displacement[run, leg]
         placement.advance(placed, swinging, intent.further, intent.yielded, gains, dt)
@@ -297,11 +300,13 @@ def _move_feet(legs, tables, gains, memory, planned, run, slot, off, intent, ste
 
     Returns the number of feet that stumble.
     """
-    rows, columns, (dt, fraction, _, _) = legs.rows, legs.columns, step
+    rows, columns, (dt, fraction, _, delay) = legs.rows, legs.columns, step
     quick, phase = 1.0 - math.exp(-dt / gains.smooth), planned.phase[run]
     foot, feet = memory.scratch[0], memory.leg_velocities
     row = int((phase + PHASE_LEAD) % 1.0 * NUM_PHASES) % NUM_PHASES
     now = int(phase % 1.0 * NUM_PHASES) % NUM_PHASES
+    # Contacts are as old as angles, and say what feet did then.
+    then = int((phase - delay * intent.strode / dt) % 1.0 * NUM_PHASES) % NUM_PHASES
     standing, mean_x, mean_y, stumbling = 0, 0.0, 0.0, 0.0
     for leg in range(rows.shape[0]):
         feet[leg, 0], feet[leg, 1], feet[leg, 2] = foot_of(
@@ -316,8 +321,8 @@ def _move_feet(legs, tables, gains, memory, planned, run, slot, off, intent, ste
                             intent, dt)
         if gains.clearance:
             stumbling += clearance.stumbles(
-                memory.contact[run, leg], tables.swinging[slot, now, leg],
-                tables.progress[slot, now, leg])
+                memory.contact[run, leg], tables.swinging[slot, then, leg],
+                tables.progress[slot, then, leg])
         displacement = memory.displacement[run, leg]
         for k in range(3):
             displacement[k] += quick * (fraction * way[k] - displacement[k])
@@ -343,7 +348,7 @@ def _stiffen(gains, memory, run, intent, step):
             spent, memory.stiff[run] and fraction == 1.0, delay, gains)
         memory.virtual_spent[run] = virtual_stiffness.spend(spent, memory.stiff[run], gains, dt)
     elif memory.stiff[run]:
-        memory.kp_scale[run] = max(intent.stiffness, gains.stiffen_kp)
+        memory.kp_scale[run] = intent.stiffness * gains.stiffen_kp
 
 
 @jit
@@ -385,8 +390,10 @@ def tick(legs, tables, gains, memory, sensors, planned, step, out):
         out[run] = planned.angles[run]
         stumbling = _move_feet(legs, tables, gains, memory, planned, run, slot, off, intent, step,
                                out[run])
+        # A body that recovers from a push leans: then feet touch early on any ground.
+        counts = fraction == 1.0 and memory.stiff_for[run] == 0.0
         memory.clearance_share[run] = clearance.update(
-            memory.clearance_share[run], stumbling if fraction == 1.0 else 0.0, gains, dt)
+            memory.clearance_share[run], stumbling if counts else 0.0, gains, dt)
         _stiffen(gains, memory, run, intent, step)
         faster = _change_strides(tables, gains, memory, run, slot, -off.vx,
                                  wrapped(planned.heading[run] - sensors.rpy[run, 2]

@@ -42,11 +42,11 @@ FEET = ((-0.2, 0.14), (-0.2, -0.14), (0.2, 0.14), (0.2, -0.14))
 
 
 def test_posture_draws_in_the_high_side_and_stretches_the_low_one():
-    rolled = [posture.in_stance(x, y, 0.1, 0.0, 0.0, 0.0, GAINS) for x, y in FEET]
+    rolled = [posture.in_stance(x, y, 0.1, 0.0, 0.0, 0.0, 0.0, GAINS) for x, y in FEET]
     assert (np.sign(rolled) == [1, -1, 1, -1]).all()
-    nodding = [posture.in_stance(x, y, 0.0, 0.0, 0.0, 1.0, GAINS) for x, y in FEET]
+    nodding = [posture.in_stance(x, y, 0.0, 0.0, 0.0, 1.0, 0.0, GAINS) for x, y in FEET]
     assert (np.sign(nodding) == [1, 1, -1, -1]).all()
-    far = [posture.in_stance(x, y, 9.0, -9.0, 0.0, 0.0, GAINS) for x, y in FEET]
+    far = [posture.in_stance(x, y, 9.0, -9.0, 0.0, 0.0, 0.0, GAINS) for x, y in FEET]
     assert np.abs(far).max() == GAINS.posture_most
 
 
@@ -156,6 +156,9 @@ def test_feet_that_stumble_are_lifted_higher_and_lower_again_later():
     assert fraction == 1.0
     assert clearance.lift(fraction, 0.5, GAINS) == pytest.approx(GAINS.clearance_most)
     assert clearance.lift(fraction, 0.0, GAINS) == clearance.lift(fraction, 1.0, GAINS) == 0.0
+    # An edge may be near where the foot lifts off or lands.
+    assert min(clearance.lift(fraction, 0.2, GAINS), clearance.lift(fraction, 0.8, GAINS)) > (
+        0.85 * GAINS.clearance_most)
     for _ in range(round(GAINS.clearance_memory / DT)):
         fraction = clearance.update(fraction, 0, GAINS, DT)
     assert fraction == pytest.approx(math.exp(-1.0))
@@ -172,12 +175,17 @@ def test_feet_stand_under_the_body_on_a_slope():
 
 
 def test_feet_are_moved_less_uphill_than_downhill():
-    up, down = slope.shift_ahead(-0.2, 0.0, GAINS), slope.shift_ahead(0.2, 0.0, GAINS)
+    up, down = (slope.shift_ahead(ground, 0.0, 0.0, GAINS) for ground in (-0.2, 0.2))
     assert up < 0.0 < down
     assert up / down == pytest.approx(-GAINS.slope_share_up / GAINS.slope_share)
-    assert slope.shift_ahead(0.0, 0.0, GAINS) == 0.0
+    assert slope.shift_ahead(0.0, 0.0, 0.0, GAINS) == 0.0
     # A walk, three of whose feet stand, has the room.
-    assert slope.shift_ahead(-0.2, 1.0, GAINS) == pytest.approx(-down)
+    assert slope.shift_ahead(-0.2, 1.0, 0.0, GAINS) == pytest.approx(-down)
+    assert slope.shift_ahead(-0.2, 1.0, 1.0, GAINS) == pytest.approx(-down)
+    # On steps feet move below the centre of mass, halfway while feet are lifted half the way.
+    steps = slope.shift_ahead(-0.2, 0.0, 1.0, GAINS)
+    assert steps == slope.shift(-0.2, 1.0, GAINS) < up
+    assert slope.shift_ahead(-0.2, 0.0, 0.5, GAINS) == pytest.approx((steps + up) / 2.0)
 
 
 def test_heading_turns_back_by_the_shorter_way():

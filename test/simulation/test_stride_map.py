@@ -47,7 +47,8 @@ def test_one_multiplier_is_that_of_the_phase_and_the_walk_attracts(trot):
 
 
 def test_small_pushes_decay_as_the_slowest_multiplier_that_they_excite_says(trot):
-    ticks, begin, first, last = round(trot.stride / 0.002), 30, 35, 45
+    # With some lengths of a tick, a push moves a touchdown to another one, which shifts the phase.
+    ticks, begin, first, last = round(trot.stride / 0.002) + 2, 30, 35, 45
     loop = ClosedLoopBatch('go2', gait_plan('trot'), timestep=trot.stride / ticks)
     pushes = [(0.1, 0.0), (-0.05, 0.1), (0.0, -0.1), (0.5, 0.2)]
     pushed = loop.run([Scenario(), *(Scenario(pushes=(impulse(begin * trot.stride, *push),))

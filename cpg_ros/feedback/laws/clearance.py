@@ -18,23 +18,28 @@ import math
 
 from cpg_ros.dynamics.integration.compilation import jit
 from cpg_ros.feedback.laws.law import Gain, Law, StateVariable
-from cpg_ros.feedback.laws.reflexes import LANDING_PHASE, STUMBLE_PHASE
 
 LAW = Law(
     'clearance', 'lift feet higher in swing while they stumble again and again', True,
     gains={
-        'clearance_most': Gain(0.04, 0.2, 'm', 'the most by which a foot is lifted in mid-swing'),
-        'clearance_rise': Gain(0.02, 0.2, 's',
+        'clearance_most': Gain(0.08, 0.2, 'm', 'the most by which a foot is lifted in mid-swing'),
+        'clearance_rise': Gain(0.01, 0.2, 's',
                                'time for which a foot has to stumble until all are lifted so far'),
         'clearance_memory': Gain(10.0, 100.0, 's', 'time constant with which the lift fades')},
     memory={
         'clearance_share': StateVariable('fraction of the largest lift')})
 
 
+#: A contact between the fractions FIRST_PHASE and LAST_PHASE of the swing says that feet are too
+#: low. On flat ground feet leave it before and land after that. Feet meet risers as late as that:
+#: reflexes take it for a landing, and let the foot down at once.
+FIRST_PHASE, LAST_PHASE = 0.3, 0.75
+
+
 @jit
 def stumbles(contact, swinging, progress):
-    """Return whether a swinging foot has hit something; the fraction is that of the swing."""
-    return contact and swinging and STUMBLE_PHASE < progress < LANDING_PHASE
+    """Return whether a swinging foot has hit something; the progress is that of the swing."""
+    return contact and swinging and FIRST_PHASE < progress < LAST_PHASE
 
 
 @jit
@@ -57,5 +62,8 @@ def update(before, stumbling, gains, dt):
 
 @jit
 def lift(fraction, progress, gains):
-    """Return how far to draw a foot in, m; the fraction is that of its swing."""
-    return fraction * gains.clearance_most * 4.0 * progress * (1.0 - progress)
+    """Return how far to draw a foot in, m; the progress is the fraction of its swing.
+
+    The foot is high for most of the swing: an edge may be near where it lifts off or lands.
+    """
+    return fraction * gains.clearance_most * (1.0 - (2.0 * progress - 1.0)**4)

@@ -26,9 +26,10 @@ LAW = Law(
         'roll_rate': Gain(0.14, 1.4, 's/rad',
                           'how far posture draws a foot in, per metre to the left and rad/s '
                           'of roll rate'),
-        'pitch': Gain(1.1, 11.0, '1/rad',
+        'pitch': Gain(0.5, 11.0, '1/rad',
                       'how far posture lets a foot out, per metre to the front and rad of '
-                      'pitch'),
+                      'pitch, in gaits whose legs swing two or more at a time'),
+        'pitch_singly': Gain(1.1, 11.0, '1/rad', 'the same in gaits whose legs swing one by one'),
         'pitch_rate': Gain(0.062, 0.62, 's/rad',
                            'how far posture lets a foot out, per metre to the front and rad/s '
                            'of pitch rate'),
@@ -36,7 +37,7 @@ LAW = Law(
 
 
 @jit
-def in_stance(x, y, roll, pitch, roll_rate, pitch_rate, gains):
+def in_stance(x, y, roll, pitch, roll_rate, pitch_rate, singly, gains):
     """Return how far to draw a foot in, m.
 
     Args:
@@ -46,11 +47,13 @@ def in_stance(x, y, roll, pitch, roll_rate, pitch_rate, gains):
         pitch: the same.
         roll_rate: the same, rad/s.
         pitch_rate: the same.
+        singly: 1 where legs swing one by one, 0 where two or more swing at a time.
         gains: of the law.
 
     """
+    per_pitch = gains.pitch + singly * (gains.pitch_singly - gains.pitch)
     return limited((gains.roll * roll + gains.roll_rate * roll_rate) * y
-                   - (gains.pitch * pitch + gains.pitch_rate * pitch_rate) * x, gains.posture_most)
+                   - (per_pitch * pitch + gains.pitch_rate * pitch_rate) * x, gains.posture_most)
 
 
 @jit

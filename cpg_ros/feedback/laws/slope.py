@@ -25,7 +25,7 @@ LAW = Law(
         'slope_share': Gain(0.7, 7.0, '',
                             'fraction of the way to the vertical through the body by which feet '
                             'are moved'),
-        'slope_share_up': Gain(0.35, 7.0, '',
+        'slope_share_up': Gain(0.45, 7.0, '',
                                'the same uphill in gaits whose legs swing two or more at a '
                                'time, where feet that are far ahead shorten strides'),
         'slope_height': Gain(0.3, 3.0, 'm', 'height of the body above its feet'),
@@ -37,12 +37,15 @@ LAW = Law(
 
 
 @jit
-def shift_ahead(ground, singly, gains):
+def shift_ahead(ground, singly, steps, gains):
     """Return how far to move all feet forward, m, on ground at an angle in rad, > 0 downhill.
 
-    ``singly`` is 1 where legs swing one by one, and 0 where two or more swing at a time.
+    ``singly`` is 1 where legs swing one by one, and 0 where two or more swing at a time. There,
+    feet move all the way the more the ground has ``steps``, 0 to 1: on stairs the body would fall
+    backward off them.
     """
     uphill = gains.slope_share_up + singly * (gains.slope_share - gains.slope_share_up)
+    uphill += (1.0 - singly) * steps * (1.0 - uphill)
     return shift(ground, gains.slope_share if ground > 0.0 else uphill, gains)
 
 

@@ -28,8 +28,8 @@ LAW = Law(
                              'velocity error, as of pace, above which servos become stiff'),
         'stiffen_hold': Gain(0.8, 8.0, 's', 'time for which they stay stiff after such an error'),
         # Drivers take a factor below 1 for 1.
-        'stiffen_kp': Gain(2.0, 4.0, '', "factor of the servos' proportional gain while stiff",
-                           low=1.0)},
+        'stiffen_kp': Gain(2.0, 4.0, '', "factor by which the servos' proportional gain is higher "
+                           'while stiff', low=1.0)},
     memory={
         'stiff_for': StateVariable('time for which servos stay stiff [s]'),
         'stiff': StateVariable('whether servos are stiff, by gains or targets', (), False),

@@ -168,6 +168,21 @@ class FeedbackTrial:
         """Return undisturbed runs."""
         return [Scenario(speed=self.speed, phase=k / NUM_CALM) for k in range(NUM_CALM)]
 
+    def grounds(self, rng: np.random.Generator, count: int = 1) -> list[Scenario]:
+        """Return runs on fields, slopes, stairs and a slippery floor, so many of each."""
+        terrains = [*(Terrain('height_field', FIELD_HEIGHT * self.length,
+                              int(rng.integers(2**31))) for _ in range(NUM_FIELDS)),
+                    *(Terrain('ramp', angle) for angle in SLOPES),
+                    Terrain('stairs', STEP_HEIGHT * self.length), None] * count
+        return [Scenario(rng.uniform(0.6, 1.0) if terrain else SLIPPERY, terrain=terrain,
+                         speed=self.speed, phase=rng.uniform()) for terrain in terrains]
+
+    def crossed(self, gains: Gains, grounds: Sequence[Scenario]) -> np.ndarray:
+        """Return the fraction of the commanded distance that runs cover; 0 for a fall."""
+        ran = self.loop.run(grounds, GROUND_DURATION, gains)
+        return np.where(ran.upright, np.clip(
+            ran.place[:, -1, 0] / (self.speed * GROUND_DURATION), 0.0, 1.0), 0.0)
+
     def survived(self, gains: Gains | None, pushed: Sequence[Scenario]) -> np.ndarray:
         """Return which runs with pushes are survived; None runs them without feedback."""
         return np.isinf(self._fell(gains, pushed, TRIAL_DURATION))
@@ -237,11 +252,12 @@ def _text(benefits: Sequence[Benefit]) -> str:
 
 #: GAIN_NAMES: law -> its gains that are searched for.
 GAIN_NAMES = {
-    'posture': ('roll', 'roll_rate', 'pitch', 'pitch_rate'),
+    'posture': ('roll', 'roll_rate', 'pitch', 'pitch_singly', 'pitch_rate'),
     'placement': ('step', 'step_left', 'step_pitch_rate', 'step_most', 'give_left'),
     'pace': ('pace_from', 'pace_gain', 'pace_most', 'pace_fatigue'),
     'reflexes': ('lift', 'reach_rate', 'reach_most'),
-    'slope': ('slope_share',), 'speed': ('speed_share', 'speed_rate')}
+    'clearance': ('clearance_most', 'clearance_rise'),
+    'slope': ('slope_share', 'slope_share_up'), 'speed': ('speed_share', 'speed_rate')}
 #: MAX_FACTOR: largest factor by which a gain changes, either way; INITIAL_SIGMA: initial standard
 #: deviation of the gains' logarithms.
 MAX_FACTOR, INITIAL_SIGMA = 8.0, 0.35
@@ -250,14 +266,19 @@ MAX_FACTOR, INITIAL_SIGMA = 8.0, 0.35
 BATCH_SIZE, NUM_PUSHES, NUM_FIELDS = 3, 8, 3
 #: IMPULSES: of pushes, as fractions of m sqrt(g l); harder than most robots survive.
 IMPULSES = (0.6, 1.0, 1.4)
-#: FIELD_HEIGHT: height of the fields, as a fraction of the legs' length.
-FIELD_HEIGHT = 0.12
-#: Weights of a price. PUSH_WEIGHT, CALM_WEIGHT, GROUND_WEIGHT: of the fraction of falls after
-#: pushes, undisturbed and on rough ground; SPEED_WEIGHT: of the relative error of the speed;
-#: COST_WEIGHT: of the relative rise of the cost of transport by feedback.
+#: FIELD_HEIGHT, STEP_HEIGHT: height of the fields and of the steps of stairs, as fractions of the
+#: legs' length; SLOPES: angles of slopes, degrees; SLIPPERY: friction of a slippery floor;
+#: GROUND_DURATION: duration of a run on these grounds, s.
+FIELD_HEIGHT, STEP_HEIGHT, SLOPES, SLIPPERY, GROUND_DURATION = 0.12, 0.2, (10.0, 15.0), 0.3, 8.0
+#: Weights of a price. PUSH_WEIGHT, CALM_WEIGHT: of the fraction of falls after pushes and
+#: undisturbed; GROUND_WEIGHT: of the missing distance on other ground, all of it after a fall;
+#: SPEED_WEIGHT: of the relative error of the speed; COST_WEIGHT: of the relative rise of the cost
+#: of transport by feedback.
 PUSH_WEIGHT, CALM_WEIGHT, GROUND_WEIGHT, SPEED_WEIGHT, COST_WEIGHT = 1.0, 1.0, 0.5, 0.5, 0.1
-#: NUM_TEST_PUSHES: pushes of each impulse that judge the result; TEST_SEED: seed that draws them.
-NUM_TEST_PUSHES, TEST_SEED = 64, 10_000_019
+#: NUM_TEST_PUSHES, NUM_TEST_GROUNDS: pushes of each impulse and sets of grounds that judge the
+#: result; TEST_SEED: seed that draws them; CROSSED: fraction of the commanded distance from which
+#: on ground counts as crossed.
+NUM_TEST_PUSHES, NUM_TEST_GROUNDS, TEST_SEED, CROSSED = 64, 6, 10_000_019, 0.5
 
 
 @dataclass(frozen=True)
@@ -290,42 +311,44 @@ def prices(job: PriceJob) -> list[float]:
         trial = FeedbackTrial(job.robot, job.model, gait, job.kp, job.kd)
         rng = np.random.default_rng(job.seed)
         pushed, calm = trial.pushed(rng, NUM_PUSHES, IMPULSES), trial.calm()
-        rough = [Scenario(speed=trial.speed, terrain=Terrain(
-            'height_field', FIELD_HEIGHT * trial.length, int(rng.integers(2**31))))
-            for _ in range(NUM_FIELDS)]
+        grounds = trial.grounds(rng)
         for k, gains in enumerate(job.candidates):
             after = trial.loop.run(pushed, TRIAL_DURATION, gains)
-            walked = trial.loop.run([*calm, *rough], WALK_DURATION, gains)
-            late = walked.velocity[:NUM_CALM, walked.velocity.shape[1] // 2:, 0].mean(axis=1)
+            walked = trial.loop.run(calm, WALK_DURATION, gains)
+            late = walked.velocity[:, walked.velocity.shape[1] // 2:, 0].mean(axis=1)
             error = np.minimum(np.abs(late / trial.speed - 1.0), 1.0).mean()
-            cost_rise = np.clip(walked.cost[:NUM_CALM] / cost - 1.0, 0.0, 10.0).mean()
-            falls = ~walked.upright
+            cost_rise = np.clip(walked.cost / cost - 1.0, 0.0, 10.0).mean()
             prices[k] += (PUSH_WEIGHT * (~after.upright).mean()
-                          + CALM_WEIGHT * falls[:NUM_CALM].mean()
-                          + GROUND_WEIGHT * falls[NUM_CALM:].mean()
+                          + CALM_WEIGHT * (~walked.upright).mean()
+                          + GROUND_WEIGHT * (1.0 - trial.crossed(gains, grounds)).mean()
                           + SPEED_WEIGHT * error + COST_WEIGHT * cost_rise)
     return (prices / len(job.gaits)).tolist()
 
 
 @dataclass(frozen=True)
 class TunedFeedback:
-    """Results of pushes on fresh seeds, in all gaits.
+    """Results of pushes and grounds on fresh seeds, in all gaits.
 
     Attributes:
         pushes: survived with the gains before the search and with the new ones.
+        grounds: crossed, the same.
         without: pushes survived without feedback.
         fell: undisturbed runs that fell with the new gains.
 
     """
 
     pushes: Survivors
+    grounds: Survivors
     without: int
     fell: int
 
     @property
     def better(self) -> bool:
-        """Whether significantly more pushes are survived, and no undisturbed robot fell."""
-        return not self.fell and self.pushes.better
+        """Whether significantly more pushes are survived, and nothing else becomes worse.
+
+        No undisturbed robot falls, and not significantly less ground is crossed.
+        """
+        return not (self.fell or self.grounds.worse) and self.pushes.better
 
     def __str__(self) -> str:
         spans = []
@@ -334,7 +357,9 @@ class TunedFeedback:
             spans.append(f'{count} of {self.pushes.runs} (95 %: {100.0 * span.low:.0f} to '
                          f'{100.0 * span.high:.0f} %)')
         return (f'fresh pushes survived: without feedback {spans[0]}, before {spans[1]}, after '
-                f'{spans[2]}; {self.fell} undisturbed runs fell')
+                f'{spans[2]}; fresh slopes, stairs, fields and slippery floors crossed: before '
+                f'{self.grounds.before} of {self.grounds.runs}, after {self.grounds.after}; '
+                f'{self.fell} undisturbed runs fell')
 
 
 def tune_feedback(robot: Robot, model: str, gaits: Sequence[str], evaluations: int, seed: int, *,
@@ -403,7 +428,7 @@ def tune_feedback(robot: Robot, model: str, gaits: Sequence[str], evaluations: i
 
 def _compared(trials: Sequence[FeedbackTrial], before: Gains, after: Gains, seed: int
               ) -> TunedFeedback:
-    """Return the results of fresh pushes with the gains before and after a search."""
+    """Return the results of fresh pushes and grounds, with the gains before and after a search."""
     fresh = [trial.pushed(np.random.default_rng(TEST_SEED + seed), NUM_TEST_PUSHES, IMPULSES)
              for trial in trials]
 
@@ -411,6 +436,14 @@ def _compared(trials: Sequence[FeedbackTrial], before: Gains, after: Gains, seed
         return np.concatenate([trial.survived(gains, pushed)
                                for trial, pushed in zip(trials, fresh, strict=True)])
 
+    rng = np.random.default_rng(TEST_SEED + seed)
+    grounds = [trial.grounds(rng, NUM_TEST_GROUNDS) for trial in trials]
+
+    def crossed(gains: Gains) -> np.ndarray:
+        return np.concatenate([trial.crossed(gains, some) >= CROSSED
+                               for trial, some in zip(trials, grounds, strict=True)])
+
     return TunedFeedback(Survivors.of(survivors(before), survivors(after)),
+                         Survivors.of(crossed(before), crossed(after)),
                          int(survivors(None).sum()),
                          sum(int(np.isfinite(trial.fell(after)).sum()) for trial in trials))

@@ -59,7 +59,12 @@ class Body(FeedbackTrial):
                    gains is None or not self.falls_undisturbed for one in scenarios]
         return SimpleNamespace(upright=np.array(upright), fell=np.where(upright, math.inf, 1.0),
                                cost=np.ones(len(scenarios)),
-                               velocity=np.full((len(scenarios), 10, 3), self.speed))
+                               velocity=np.full((len(scenarios), 10, 3), self.speed),
+                               place=np.full((len(scenarios), 10, 2), 9.0))
+
+
+#: As many runs survived as before.
+SAME = Survivors(42, 30, 30, 0)
 
 
 @pytest.fixture
@@ -120,7 +125,15 @@ def test_better_gains_of_a_feedback_that_does_not_help_leave_it_off(body, monkey
     (45, 5, 0, False), (70, 0, 1, False)])
 def test_gains_are_better_only_where_chance_does_not_make_them_so(after, lost, fell, better):
     """Of n pushes that only one survives, all n after: p = 2^-n, below 0.05 from n = 5 on."""
-    assert feedback.TunedFeedback(Survivors(96, 50, after, lost), 20, fell).better is better
+    assert feedback.TunedFeedback(Survivors(96, 50, after, lost), SAME, 20, fell).better is better
+
+
+def test_gains_with_which_less_ground_is_crossed_are_no_better():
+    pushes = Survivors(96, 50, 90, 0)
+    for lost, better in ((5, False), (4, True)):
+        found = feedback.TunedFeedback(pushes, Survivors(42, 30, 30 - lost, lost), 20, 0)
+        assert found.better is better
+        assert f'crossed: before 30 of 42, after {30 - lost}' in str(found)
 
 
 def test_every_gain_that_is_searched_for_exists():

@@ -121,7 +121,8 @@ def test_a_good_gait_ends_with_code_0_and_gains_are_ones_own(hardly_pushed, tmp_
 
 
 def test_tuned_feedback_is_written_with_what_it_was_found_by(tmp_path, capsys, monkeypatch):
-    found, out, asked = TunedFeedback(Survivors(96, 50, 61, 2), 20, 0), tmp_path / 'a.yaml', []
+    found = TunedFeedback(Survivors(96, 50, 61, 2), Survivors(42, 30, 30, 0), 20, 0)
+    out, asked = tmp_path / 'a.yaml', []
     own = OwnFeedback(made=str(found), gains={'step': 0.9})
 
     def searched(robot, model, gaits, evaluations, seed, **options):
