@@ -30,9 +30,9 @@ LAW = Law(
         'clearance_share': StateVariable('fraction of the largest lift')})
 
 
-#: A contact between the fractions FIRST_PHASE and LAST_PHASE of the swing says that feet are too
-#: low. On flat ground feet leave it before and land after that. Feet meet risers as late as that:
-#: reflexes take it for a landing, and let the foot down at once.
+#: A contact between the fractions FIRST_PHASE and LAST_PHASE of the swing is a stumble. A trot's
+#: feet may touch flat ground before FIRST_PHASE. They meet risers later than LANDING_PHASE of
+#: reflexes, which holds such a foot where it is.
 FIRST_PHASE, LAST_PHASE = 0.3, 0.75
 
 

@@ -39,7 +39,7 @@ from cpg_ros.motion.robot import Robot
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.simulation.closed_loop import ClosedLoopBatch
 from cpg_ros.simulation.scenario import impulse, Scenario, SensorNoise
-from cpg_ros.simulation.terrain import Terrain
+from cpg_ros.simulation.terrain import MAX_HEIGHT, Terrain
 from cpg_ros.simulation.tuning.gaits import cma_es, cma_search, scaled_gains, Survivors
 import numpy as np
 from scipy.stats import binomtest
@@ -173,7 +173,7 @@ class FeedbackTrial:
         terrains = [*(Terrain('height_field', FIELD_HEIGHT * self.length,
                               int(rng.integers(2**31))) for _ in range(NUM_FIELDS)),
                     *(Terrain('ramp', angle) for angle in SLOPES),
-                    Terrain('stairs', STEP_HEIGHT * self.length), None] * count
+                    Terrain('stairs', min(STEP_HEIGHT * self.length, MAX_HEIGHT)), None] * count
         return [Scenario(rng.uniform(0.6, 1.0) if terrain else SLIPPERY, terrain=terrain,
                          speed=self.speed, phase=rng.uniform()) for terrain in terrains]
 
